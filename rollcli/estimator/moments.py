@@ -140,6 +140,7 @@ def _size(shape: tuple[int, ...]) -> str:
 
 
 Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
 
 _ROWS = 32  # of a block: its doubles stay in the cache
 _CHOOSE = np.array([[float(math.comb(j, k)) for k in range(5)] for j in range(5)])

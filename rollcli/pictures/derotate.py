@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
-from rollcli.estimator.moments import map_of, strips
+from rollcli.estimator.moments import Floats, map_of, strips
 
-Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _BLOCK = 1 << 16  # pixels turned at a time: what they need stays in the processor's cache

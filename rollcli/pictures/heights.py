@@ -27,13 +27,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
 from rollcli.estimator.estimate import RollEstimate
-from rollcli.estimator.moments import LARGEST, map_of, strips
+from rollcli.estimator.moments import LARGEST, Floats, Singles, map_of, strips
 from rollcli.estimator.road.model import FARTHEST_SIDE, RoadModel
+from rollcli.estimator.road.sample import medians_of
 from rollcli.files.results import Row
 from rollcli.rig.calibration import Calibration, require_calibration
 
-Singles = NDArray[np.float32]
-Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _BLOCK = 1 << 16  # pixels at a time: what they need stays in the processor's cache
@@ -44,7 +43,7 @@ _HALF_LANE = 0.8  # camera heights to each side: of a lane's width dips and cars
 _FAR = 8.0  # times as far as at the bottom: beyond, what the parabola leaves is kept as it is there
 _OVER = 0.14  # of that range, nearer than the bottom's middle: the corners of rolled maps
 _BINS = 32  # in equal steps of log d
-_LEAST_BINS, _LEAST_PIXELS = 12, 12  # bins that are needed, and pixels in each
+_LEAST_BINS = 12  # that are needed
 _SAMPLED = 125, 125  # rows and columns: twice as many move no height by 0.1 mm
 # how far off the profile the road may be, camera heights at twice the bottom's distance and before, beyond it
 # in proportion: at first what a parabola leaves on the steepest hills, then half of a kerb
@@ -236,17 +235,18 @@ class _Profile:
         share = 1 - np.log(bottom / d) / math.log(_FAR)
         near = (np.abs(side) < _HALF_LANE) & (share > 0) & (share < 1 + _OVER)
         d, gap = d[near], gap[near]
-        place = (share[near] * (_BINS / (1 + _OVER))).astype(np.intp)
+        place = (share[near] * (_BINS / (1 + _OVER))).astype(np.uint16)
         middles = bottom * _FAR ** ((np.arange(_BINS) + 0.5) * ((1 + _OVER) / _BINS) - 1)
         scaled = np.maximum(1, bottom / (2 * middles)) * middles / self.rise
         design, weights = _profile_basis(middles / bottom), np.zeros(_BINS)
         fitted, left = np.zeros(4), gap
         for tolerance in _TOLERANCES:
             close = np.abs(left) < (tolerance * scaled)[place]
-            medians, found = _medians(place[close], left[close])
+            medians = np.array(medians_of(place[close], left[close], _BINS))
+            found = np.isfinite(medians)
             if np.count_nonzero(found) < _LEAST_BINS:
                 return self
-            more, weights = _steady_fit(design, medians, found)
+            more, weights = _steady_fit(design, np.nan_to_num(medians), found)
             fitted = fitted + more
             left = gap - (design @ fitted)[place]
         (used,) = np.nonzero(weights > 0)
@@ -300,18 +300,6 @@ class _Profile:
 def _profile_basis(x: NDArray[Any]) -> NDArray[Any]:
     """Return 1, x, 1/x, x^2 of disparities, shape (N, 4)."""
     return np.stack([np.ones_like(x), x, 1 / x, x * x], axis=1)
-
-
-def _medians(place: NDArray[np.intp], values: Singles) -> tuple[Floats, Flags]:
-    """Return the medians of values in bins, and which bins have enough of them."""
-    spread = 2 * float(np.abs(values).max(initial=0)) + 1
-    ordered = np.sort(place * spread + values)  # one sort of all
-    counts = np.bincount(place, minlength=_BINS)
-    found = counts >= _LEAST_PIXELS
-    medians = np.zeros(_BINS)
-    (some,) = np.nonzero(found)
-    medians[some] = ordered[(np.cumsum(counts) - counts + counts // 2)[some]] - some * spread
-    return medians, found
 
 
 def _steady_fit(design: Floats, values: Floats, found: Flags) -> tuple[NDArray[Any], NDArray[Any]]:

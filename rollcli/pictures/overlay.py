@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.estimator.moments import strips
-from rollcli.pictures.heights import METRES, Singles
+from rollcli.estimator.moments import Singles, strips
+from rollcli.pictures.heights import METRES
 
 Pixels = NDArray[np.uint8]
 
