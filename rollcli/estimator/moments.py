@@ -88,6 +88,12 @@ def map_of(disparity: ArrayLike | None) -> NDArray[Any]:
         raise UsageError(f"a disparity map is a 2-D array of real numbers: {error}") from error
 
 
+def strips(height: int, rows: int) -> list[slice]:
+    """Return the rows of a map in slices of so many, or of one: for large maps, or the processor's cache."""
+    rows = max(1, rows)
+    return [slice(top, min(top + rows, height)) for top in range(0, height, rows)]
+
+
 def require_pixels(valid: NDArray[np.bool_]) -> int:
     """Count the valid pixels, and refuse too few of them.
 
@@ -134,6 +140,7 @@ def _size(shape: tuple[int, ...]) -> str:
 
 
 Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
 
 _ROWS = 32  # of a block: its doubles stay in the cache
 _CHOOSE = np.array([[float(math.comb(j, k)) for k in range(5)] for j in range(5)])
@@ -210,8 +217,7 @@ def map_moments(disparity: NDArray[Any], weights: NDArray[Any] | None = None) ->
     along = powers((np.arange(width) - grid.centre_u) / grid.scale)
     down = powers((np.arange(height) - grid.centre_v) / grid.scale)
     s, t, dd = np.zeros((5, 5)), np.zeros((3, 3)), 0.0
-    for first in range(0, height, _ROWS):
-        rows = slice(first, first + _ROWS)
+    for rows in strips(height, _ROWS):
         block = np.fmax(disparity[rows], 0).astype(np.float64)  # fmax: NaN gives way to 0
         block[np.isinf(block)] = 0
         w, pull = (block > 0).astype(np.float64), block

@@ -11,130 +11,189 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class SampleTuning:
-    """Numbers of `take_sample`: which pixels are looked at, and how far they may be off."""
+    """Numbers of `take_sample`: which pixels are looked at, and how far they may be off.
+
+    Attributes
+    ----------
+    pixels : int
+        Pixels aimed at. With 10,000 rendered frames are as exact, but fewer lidar sweeps are covered (0.90
+        and not 0.93), and real maps are lost on which a third or half of the pixels are noise.
+    coarse_pixels : int
+        Pixels of these that planes are drawn through, fitted to and judged by.
+    noise_share : float
+        Share of the median disparity that matching gets wrong on real roads, whatever the scale.
+    uneven_share : float
+        Share of a pixel's own disparity: 2 % of the camera's height, 3 cm on a car.
+    reach : float
+        Of the map's longer side: how far away neighbours are. Nearer ones share a matcher's errors.
+    """
 
     pixels: int = 12000
-    """Pixels aimed at. With 10,000 rendered frames are as exact, but fewer lidar sweeps are covered (0.90 and
-    not 0.93), and real maps are lost on which a third or half of the pixels are noise."""
     coarse_pixels: int = 1600
-    """Pixels of these that planes are drawn through, fitted to and judged by."""
     noise_share: float = 0.012
-    """Share of the median disparity that matching gets wrong on real roads, whatever the scale."""
     uneven_share: float = 0.02
-    """Share of a pixel's own disparity: 2 % of the camera's height, 3 cm on a car."""
     reach: float = 1 / 310
-    """Of the map's longer side: how far away neighbours are. Nearer ones share a matcher's errors."""
 
 
 @dataclass(frozen=True)
 class SearchTuning:
-    """Numbers of `find_road`: which planes are tried, and what makes a plane a road."""
+    """Numbers of `find_road`: which planes are tried, and what makes a plane a road.
+
+    Attributes
+    ----------
+    draws : int
+        Triples drawn; about half are planes that could be a road.
+    radius : float
+        Of a triple, units. Smaller: planes are noise; larger: triples leave the road.
+    first_pixels : int
+        Pixels on which all planes are judged.
+    refined : int
+        Planes that go on, each the best of its roll: they are fitted, and judged on more pixels. Of 41 maps
+        of real pairs and twelve seeds one had no angle with 4: the road's was the sixth. 8 cost 3 % of a map.
+    corridor : float
+        Half-width of the corridor ahead, and of the lane in it, camera heights.
+    off_slope_weight : float
+        Weight of a pixel around which the map does not rise as the road does.
+    slope_share : float
+        Of the road's own slope: how far the map's may be off.
+    """
 
     draws: int = 256
-    """Triples drawn; about half are planes that could be a road."""
     radius: float = 0.35
-    """Of a triple, units. Smaller: planes are noise; larger: triples leave the road."""
     first_pixels: int = 240
-    """Pixels on which all planes are judged."""
     refined: int = 8
-    """Planes that go on, each the best of its roll: they are fitted, and judged on more pixels. Of 41 maps of
-    real pairs and twelve seeds one had no angle with 4: the road's was the sixth. 8 cost 3 % of a map."""
     corridor: float = 1.0
-    """Half-width of the corridor ahead, and of the lane in it, camera heights."""
     off_slope_weight: float = 0.2
-    """Weight of a pixel around which the map does not rise as the road does."""
     slope_share: float = 0.4
-    """Of the road's own slope: how far the map's may be off."""
 
 
 @dataclass(frozen=True)
 class FitTuning:
-    """Numbers of `fit_surface`: the robust fit of parabola, roll and camber, and the profile across."""
+    """Numbers of `fit_surface`: the robust fit of parabola, roll and camber, and the profile across.
+
+    Attributes
+    ----------
+    pixels : int
+        Pixels near the plane that are looked at, each averaged with those around it.
+    start_width : float
+        Tolerances within which a pixel counts at first.
+    width : float
+        Of the pixels' root mean square distance: within which they count in the end.
+    other_roll : float
+        Radians: what a rig rolled by this much more or less would not see does not count.
+    camber : float
+        How much camber a road has, as the standard deviation of a prior, 1/(camera height). With 0.002 the
+        errors on crowned roads are a quarter larger (95 %).
+    off_level : float
+        Camera heights over or under the lane at which the weight is halved: on gentle verges and the far side
+        of a crown there is no step.
+    profile : float
+        Camera heights to the side at which weights end, as exp(-(side / profile)^8).
+    """
 
     pixels: int = 4500
-    """Pixels near the plane that are looked at, each averaged with those around it."""
     start_width: float = 2.0
-    """Tolerances within which a pixel counts at first."""
     width: float = 3.75
-    """Of the pixels' root mean square distance: within which they count in the end."""
     other_roll: float = 0.10
-    """Radians: what a rig rolled by this much more or less would not see does not count."""
     camber: float = 0.003
-    """How much camber a road has, as the standard deviation of a prior, 1/(camera height). With 0.002 the
-    errors on crowned roads are a quarter larger (95 %)."""
     off_level: float = 0.01
-    """Camera heights over or under the lane at which the weight is halved: on gentle verges and the far side
-    of a crown there is no step."""
     profile: float = 1.25
-    """Camera heights to the side at which weights end, as exp(-(side / profile)^8)."""
 
 
 @dataclass(frozen=True)
 class IntervalTuning:
-    """Numbers of `jackknife` and `interval_of`."""
+    """Numbers of `jackknife` and `interval_of`.
+
+    Attributes
+    ----------
+    groups : int
+        Bands and columns of the jackknife. More are less independent, fewer have fewer degrees of freedom.
+    independent_pixels : int
+        Pixels that could be independent: neighbouring ones repeat each other, more do not tell more.
+    white : float
+        Of the textbook's half-width: what makes neighbours alike shows in bands and columns, too. With 1 the
+        interval covers every flat rendered road; tangents need all of it, since one shift of all disparities
+        turns no road, and shows nowhere else.
+    factor : float
+        Of the jackknife's half-width. Two thirds of it cover 0.86 of 28 real maps instead of 0.93, and 0.92
+        of 24 rendered ones instead of 0.96.
+    uneven : float
+        Of the road's unevenness over the width of the view. A view that is narrow in camera heights shows
+        only what is near, and the lane farther ahead differs the more. Fitted to rendered roads of ISO 8608's
+        classes A to D, of which it covers 0.93 instead of 0.78; of 41 lidar sweeps 0.95 instead of 0.83.
+    levelled : float
+        By how much noise falls from a quarter of a patch to the whole: by 4 where neighbours share none of
+        it. With 4 the intervals of smooth rendered roads are half as wide again; with 2, 0.86 of the rough
+        ones and 0.85 of the sweeps are covered.
+    bend : float
+        Of the angle by which the camber moves theta: a crown is no exact parabola.
+    slant : float
+        Growth of the interval from no roll to a right angle, by the sine of the roll.
+    """
 
     groups: int = 6
-    """Bands and columns of the jackknife. More are less independent, fewer have fewer degrees of freedom."""
     independent_pixels: int = 100
-    """Pixels that could be independent: neighbouring ones repeat each other, more do not tell more."""
     white: float = 0.2
-    """Of the textbook's half-width: what makes neighbours alike shows in bands and columns, too. With 1 the
-    interval covers every flat rendered road; tangents need all of it, since one shift of all disparities
-    turns no road, and shows nowhere else."""
     factor: float = 0.65
-    """Of the jackknife's half-width. Two thirds of it cover 0.86 of 28 real maps instead of 0.93, and 0.92 of
-    24 rendered ones instead of 0.96."""
     uneven: float = 10.0
-    """Of the road's unevenness over the width of the view. A view that is narrow in camera heights shows only
-    what is near, and the lane farther ahead differs the more. Fitted to rendered roads of ISO 8608's classes
-    A to D, of which it covers 0.93 instead of 0.78; of 41 lidar sweeps 0.95 instead of 0.83."""
     levelled: float = 2.5
-    """By how much noise falls from a quarter of a patch to the whole: by 4 where neighbours share none of it.
-    With 4 the intervals of smooth rendered roads are half as wide again; with 2, 0.86 of the rough ones and
-    0.85 of the sweeps are covered."""
     bend: float = 2.75
-    """Of the angle by which the camber moves theta: a crown is no exact parabola."""
     slant: float = 1.0
-    """Growth of the interval from no roll to a right angle, by the sine of the roll."""
 
 
 @dataclass(frozen=True)
 class DoubtTuning:
-    """Numbers of the reasons to doubt an angle; each is where an angle stops being ok."""
+    """Numbers of the reasons to doubt an angle; each is where an angle stops being ok.
+
+    Attributes
+    ----------
+    near_minimum : float
+        Times the lowest energy up to which another minimum is nearly as low.
+    other_angle : float
+        Radians by which another minimum is another answer.
+    narrowest : float
+        Camera heights that a view is wide at its bottom at the least: cameras that look down at the road see
+        1.06, those at a table 0.6. Without it 26 of 1080 scenes without a road are ok in place of 2.
+    filled_by_horizon : float
+        Least share of all pixels that is on the road, for each unit from the centre to its horizon: the
+        further down a camera looks, the more it sees of its road. Without it 20 of 1080 scenes without a road
+        are ok in place of 2 (bench_roadless.py).
+    most_filled : float
+        That share at most: empty roads seen steeply from above leave 0.98, tables 0.95.
+    reach : float
+        Camera heights that the view is wide, up to where a road goes on at the least, and twice as far: all
+        of 131 real roads do, and all of 540 rendered ones but 3 that end behind a truck. Planes that are none
+        mostly end nearer than 4.
+    most_below : float
+        Share of the lane's pixels in a band that may lie below the plane: of real and rendered roads 0.4 at
+        most. Without it 13 of 1080 scenes without a road are ok in place of 2, desks above all; with 0.3
+        roads behind noise or a wall over half of the image are doubted twice as often.
+    least_beyond : float
+        Share of the pixels beyond `reach` that is on the plane: 0.27 and more on real roads, 0.07 behind a
+        truck. Without it 47 scenes are ok: shelves, desks, rooms.
+    rival_share : float
+        Share of the road's score from which another plane explains the map nearly as well.
+    longest_move : float
+        Radians by which the fit to the road's pixels may move the roll of its plane.
+    bound_share : float
+        Share of the largest roll from which a roll is at its bound.
+    noise_share : float
+        Share of the widest interval that noise alone may make. At two thirds of it six of 28 real maps that
+        are right are doubted, instead of two.
+    """
 
     near_minimum: float = 1.1
-    """Times the lowest energy up to which another minimum is nearly as low."""
     other_angle: float = math.radians(2)
-    """Radians by which another minimum is another answer."""
     narrowest: float = 0.8
-    """Camera heights that a view is wide at its bottom at the least: cameras that look down at the road see
-    1.06, those at a table 0.6. Without it 26 of 1080 scenes without a road are ok in place of 2."""
     filled_by_horizon: float = 0.7
-    """Least share of all pixels that is on the road, for each unit from the centre to its horizon: the
-    further down a camera looks, the more it sees of its road. Without it 20 of 1080 scenes without a road
-    are ok in place of 2 (bench_roadless.py)."""
     most_filled: float = 0.97
-    """That share at most: empty roads seen steeply from above leave 0.98, tables 0.95."""
     reach: float = 8.0
-    """Camera heights that the view is wide, up to where a road goes on at the least, and twice as far: all of
-    131 real roads do, and all of 540 rendered ones but 3 that end behind a truck. Planes that are none
-    mostly end nearer than 4."""
     most_below: float = 0.5
-    """Share of the lane's pixels in a band that may lie below the plane: of real and rendered roads 0.4 at
-    most. Without it 13 of 1080 scenes without a road are ok in place of 2, desks above all; with 0.3 roads
-    behind noise or a wall over half of the image are doubted twice as often."""
     least_beyond: float = 0.15
-    """Share of the pixels beyond `reach` that is on the plane: 0.27 and more on real roads, 0.07 behind a
-    truck. Without it 47 scenes are ok: shelves, desks, rooms."""
     rival_share: float = 0.75
-    """Share of the road's score from which another plane explains the map nearly as well."""
     longest_move: float = math.radians(1)
-    """Radians by which the fit to the road's pixels may move the roll of its plane."""
     bound_share: float = 0.99
-    """Share of the largest roll from which a roll is at its bound."""
     noise_share: float = 0.45
-    """Share of the widest interval that noise alone may make. At two thirds of it six of 28 real maps that
-    are right are doubted, instead of two."""
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """The paper's experiments on one map: accuracy, rotations, and run times (Tables I and II, Figs. 3 to 5)."""
 
 import math
-import time
+import timeit
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -332,12 +332,7 @@ def time_solvers(disparity: NDArray[Any]) -> Times:
 
 def _best(function: Callable[[], Any], times: int) -> float:
     """Return the seconds of the fastest of several runs."""
-    best = math.inf
-    for _ in range(times):
-        start = time.perf_counter()
-        function()
-        best = min(best, time.perf_counter() - start)
-    return best
+    return min(timeit.repeat(function, number=1, repeat=times))
 
 
 Examined = tuple[FrameResult, Findings | None]  # of a map; the result says why there are no findings

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
-from rollcli.estimator.moments import map_of
+from rollcli.estimator.moments import Floats, map_of, strips
 
-Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _BLOCK = 1 << 16  # pixels turned at a time: what they need stays in the processor's cache
@@ -80,9 +79,7 @@ def derotate(
     # a border without data, and a second one: pixels just outside have neighbours too
     padded = np.pad(np.where(valid, values, 0).astype(wide), 2)
     result = np.full(turn.size, _no_data(values, valid), values.dtype)
-    step = max(1, _BLOCK // turn.size[1])
-    for top in range(0, turn.size[0], step):
-        rows = slice(top, top + step)
+    for rows in strips(turn.size[0], _BLOCK // turn.size[1]):
         turned, known = _interpolated(padded, turn.sources(rows))
         known &= kept[rows]
         turned = np.rint(turned) if values.dtype.kind in "iu" else turned

@@ -27,13 +27,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
 from rollcli.estimator.estimate import RollEstimate
-from rollcli.estimator.moments import LARGEST, Grid, map_of
-from rollcli.estimator.road.model import FARTHEST_SIDE
+from rollcli.estimator.moments import LARGEST, Floats, Singles, map_of, strips
+from rollcli.estimator.road.model import FARTHEST_SIDE, RoadModel
+from rollcli.estimator.road.sample import medians_of
 from rollcli.files.results import Row
 from rollcli.rig.calibration import Calibration, require_calibration
 
-Singles = NDArray[np.float32]
-Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _BLOCK = 1 << 16  # pixels at a time: what they need stays in the processor's cache
@@ -44,7 +43,7 @@ _HALF_LANE = 0.8  # camera heights to each side: of a lane's width dips and cars
 _FAR = 8.0  # times as far as at the bottom: beyond, what the parabola leaves is kept as it is there
 _OVER = 0.14  # of that range, nearer than the bottom's middle: the corners of rolled maps
 _BINS = 32  # in equal steps of log d
-_LEAST_BINS, _LEAST_PIXELS = 12, 12  # bins that are needed, and pixels in each
+_LEAST_BINS = 12  # that are needed
 _SAMPLED = 125, 125  # rows and columns: twice as many move no height by 0.1 mm
 # how far off the profile the road may be, camera heights at twice the bottom's distance and before, beyond it
 # in proportion: at first what a parabola leaves on the steepest hills, then half of a kerb
@@ -61,19 +60,13 @@ class FittedRoad:
 
     Attributes
     ----------
-    theta : float
-        Roll in the pixels of the map, radians.
-    alpha : tuple of float
-        (a0, a1, a2), px, y measured from the centre of the top-left pixel.
-    camber : float
-        Curvature across the road, 1/(camera height).
+    model : RoadModel
+        In pixels of the map, from the centre of the top-left one.
     width, height : int
         Of the map, px.
     """
 
-    theta: float
-    alpha: tuple[float, float, float]
-    camber: float
+    model: RoadModel
     width: int
     height: int
 
@@ -81,8 +74,8 @@ class FittedRoad:
     def of_estimate(cls, estimate: RollEstimate) -> "FittedRoad":
         """Take the road of an estimate, with or without a pose."""
         # the angle of the pixels, which is not the rig's where fx and fy differ
-        theta, camber = estimate.tangent.theta, estimate.camber or 0.0
-        return cls(theta, estimate.alpha, camber, estimate.width, estimate.height)
+        model = RoadModel(estimate.tangent.theta, estimate.alpha, estimate.camber or 0.0)
+        return cls(model, estimate.width, estimate.height)
 
     @classmethod
     def of_row(cls, row: Row, calibration: Calibration | None) -> "FittedRoad | None":
@@ -96,7 +89,18 @@ class FittedRoad:
         theta = math.radians(row.roll_deg)
         if calibration is not None and row.pitch_deg is not None:
             theta = math.atan2(math.sin(theta) * calibration.fy / calibration.fx, math.cos(theta))
-        return cls(theta, row.alpha, row.camber or 0.0, row.width, row.height)
+        return cls(RoadModel(theta, row.alpha, row.camber or 0.0), row.width, row.height)
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """The map's middle, column and row."""
+        return (self.width - 1) / 2, (self.height - 1) / 2
+
+    @property
+    def middle_rise(self) -> float:
+        """The rise in the map's middle, px per px: it is the unit of camber."""
+        _, a1, a2 = self.model.alpha
+        return abs(a1 + 2 * a2 * self.model.along(*self.middle))
 
 
 def unit_of(calibration: Calibration | None) -> str:
@@ -168,10 +172,9 @@ def heights_over(disparity: NDArray[Any], road: FittedRoad, calibration: Calibra
     measured = calibration if unit_of(calibration) == METRES else None
     over = _Heights(road, profile.along(disparity, road), measured)
     columns = np.arange(road.width, dtype=np.float32)
-    step = max(1, _BLOCK // road.width)
-    for top in range(0, road.height, step):
-        rows = np.arange(top, min(top + step, road.height), dtype=np.float32)
-        over.fill(disparity[top : top + step], rows, columns, heights[top : top + step])
+    for some in strips(road.height, _BLOCK // road.width):
+        rows = np.arange(some.start, some.stop, dtype=np.float32)
+        over.fill(disparity[some], rows, columns, heights[some])
     return heights
 
 
@@ -208,16 +211,16 @@ class _Profile:
 
         The bottom is half the map's height below its centre, along the road: the same on a rolled copy.
         """
-        a0, a1, a2 = road.alpha
-        bottom = _centre_along(road) + (road.height - 1) / 2
-        half = (a0 + bottom * (a1 + a2 * bottom)) / 2
+        a0, a1, a2 = road.model.alpha
+        centre = road.model.along(*road.middle)
+        bottom = centre + (road.height - 1) / 2
+        half = road.model.disparity_along(bottom) / 2
         square = a1 * a1 + 4 * a2 * (half - a0)
         if not (half > 0 and square > 0 and a1 + 2 * a2 * bottom > 0):
             return None
         rise = math.sqrt(square)
         # of the two rows with that disparity the one on the rising branch, in a form that bears a2 = 0
-        centre = _centre_along(road)
-        c0, c1 = a0 + centre * (a1 + a2 * centre), a1 + 2 * a2 * centre
+        c0, c1 = road.model.disparity_along(centre), a1 + 2 * a2 * centre
         row = centre + (2 * (half - c0) / (c1 + rise) if c1 > 0 else (rise - c1) / (2 * a2))
         return cls(row, half, rise, a2)
 
@@ -232,17 +235,18 @@ class _Profile:
         share = 1 - np.log(bottom / d) / math.log(_FAR)
         near = (np.abs(side) < _HALF_LANE) & (share > 0) & (share < 1 + _OVER)
         d, gap = d[near], gap[near]
-        place = (share[near] * (_BINS / (1 + _OVER))).astype(np.intp)
+        place = (share[near] * (_BINS / (1 + _OVER))).astype(np.uint16)
         middles = bottom * _FAR ** ((np.arange(_BINS) + 0.5) * ((1 + _OVER) / _BINS) - 1)
         scaled = np.maximum(1, bottom / (2 * middles)) * middles / self.rise
         design, weights = _profile_basis(middles / bottom), np.zeros(_BINS)
         fitted, left = np.zeros(4), gap
         for tolerance in _TOLERANCES:
             close = np.abs(left) < (tolerance * scaled)[place]
-            medians, found = _medians(place[close], left[close])
+            medians = np.array(medians_of(place[close], left[close], _BINS))
+            found = np.isfinite(medians)
             if np.count_nonzero(found) < _LEAST_BINS:
                 return self
-            more, weights = _steady_fit(design, medians, found)
+            more, weights = _steady_fit(design, np.nan_to_num(medians), found)
             fitted = fitted + more
             left = gap - (design @ fitted)[place]
         (used,) = np.nonzero(weights > 0)
@@ -261,7 +265,7 @@ class _Profile:
         over.fill(some, rows, columns, heights)
         known = np.isfinite(heights)
         d = some[known].astype(np.float32)
-        side = over.across(columns, rows[:, None])[known] * np.float32(_centre_rise(road)) / d
+        side = over.across(columns, rows[:, None])[known] * np.float32(road.middle_rise) / d
         return d, side, heights[known] * d / np.float32(self.rise)
 
     def at(self, disparity: Singles) -> tuple[Singles, Singles]:
@@ -298,18 +302,6 @@ def _profile_basis(x: NDArray[Any]) -> NDArray[Any]:
     return np.stack([np.ones_like(x), x, 1 / x, x * x], axis=1)
 
 
-def _medians(place: NDArray[np.intp], values: Singles) -> tuple[Floats, Flags]:
-    """Return the medians of values in bins, and which bins have enough of them."""
-    spread = 2 * float(np.abs(values).max(initial=0)) + 1
-    ordered = np.sort(place * spread + values)  # one sort of all
-    counts = np.bincount(place, minlength=_BINS)
-    found = counts >= _LEAST_PIXELS
-    medians = np.zeros(_BINS)
-    (some,) = np.nonzero(found)
-    medians[some] = ordered[(np.cumsum(counts) - counts + counts // 2)[some]] - some * spread
-    return medians, found
-
-
 def _steady_fit(design: Floats, values: Floats, found: Flags) -> tuple[NDArray[Any], NDArray[Any]]:
     """Fit values by least absolute deviations, then by Tukey's weights, six spreads wide; return those, too.
 
@@ -326,12 +318,6 @@ def _steady_fit(design: Floats, values: Floats, found: Flags) -> tuple[NDArray[A
         spread = max(1.4826 * float(np.sort(off[found])[middle]), _LEAST_SPREAD)
         weights = found * np.square(np.maximum(1 - np.square(off / (6 * spread)), 0))
     return fitted, weights
-
-
-def _centre_along(road: FittedRoad) -> float:
-    """Return the map's centre along the road, px."""
-    centre = Grid.of_shape(road.height, road.width)
-    return centre.centre_v * math.cos(road.theta) - centre.centre_u * math.sin(road.theta)
 
 
 @dataclass(frozen=True)
@@ -361,12 +347,12 @@ class _Heights:
         np.copyto(d, np.float32(self.profile.disparity), where=unknown)
         shifted = d + np.float32(doffs) if doffs else d
         rows = rows[:, None]
-        camber = self._camber(d, self.across(columns, rows)) if self.road.camber else None
+        camber = self._camber(d, self.across(columns, rows)) if self.road.model.camber else None
         foot, rise = self.profile.at(d if camber is None else d * camber.rest)
         if camber is not None:
             rise *= camber.root
-        gap = foot - columns * np.float32(-math.sin(self.road.theta))
-        gap -= rows * np.float32(math.cos(self.road.theta)) - np.float32(self.profile.row)
+        gap = foot - columns * np.float32(-math.sin(self.road.model.theta))
+        gap -= rows * np.float32(math.cos(self.road.model.theta)) - np.float32(self.profile.row)
         if self.calibration is None:
             gap *= np.float32(self.profile.rise)
             np.divide(gap, d, out=heights)
@@ -378,17 +364,13 @@ class _Heights:
 
     def across(self, columns: Singles, rows: Singles) -> Singles:
         """Return the place across the road of pixels, px from the map's middle."""
-        centre = Grid.of_shape(self.road.height, self.road.width)
-        cosine, sine = math.cos(self.road.theta), math.sin(self.road.theta)
-        across: Singles = (columns - np.float32(centre.centre_u)) * np.float32(cosine) + (
-            rows - np.float32(centre.centre_v)
-        ) * np.float32(sine)
-        return across
+        column, row = self.road.middle
+        return self.road.model.across(columns - column, rows - row)
 
     def _camber(self, d: Singles, across: Singles) -> "_Camber":
         """Take from disparities what camber adds, which is of the disparity without it [RoadModel]."""
-        camber = self.road.camber
-        side = across * np.float32(_centre_rise(self.road))
+        camber = self.road.model.camber
+        side = across * np.float32(self.road.middle_rise)
         side /= d
         # camber is not extrapolated beyond `FARTHEST_SIDE`, which is of the disparity without it
         most = np.float32(FARTHEST_SIDE / max(1 + camber / 2 * FARTHEST_SIDE**2, _FLATTEST))
@@ -416,7 +398,7 @@ class _Heights:
         camber: "_Camber | None",
     ) -> Singles:
         """Return |q| of the planes that touch the road, by their rise, 1/m."""
-        cosine, sine = math.cos(self.road.theta), math.sin(self.road.theta)
+        cosine, sine = math.cos(self.road.model.theta), math.sin(self.road.model.theta)
         aspect = calibration.fy / calibration.fx
         at = np.array([[calibration.cx]], np.float32), np.array([[calibration.cy]], np.float32)
         along = calibration.cy * cosine - calibration.cx * sine - self.profile.row
@@ -427,7 +409,7 @@ class _Heights:
         lean: Singles | np.float32 = square
         if camber is not None:
             tilt = camber.side / rise
-            tilt *= np.float32(self.road.camber * _centre_rise(self.road))
+            tilt *= np.float32(self.road.model.camber * self.road.middle_rise)
             ahead += tilt * (self.across(*at) - camber.across)
             leant = tilt * np.float32(cosine**2 + (aspect * sine) ** 2)
             if aspect != 1:
@@ -463,9 +445,3 @@ class _Camber:
     side: Singles
     rest: Singles
     root: Singles
-
-
-def _centre_rise(road: FittedRoad) -> float:
-    """Return the rise at the map's centre, px per px: it is the unit of camber."""
-    _, a1, a2 = road.alpha
-    return abs(a1 + 2 * a2 * _centre_along(road))

@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.pictures.heights import METRES, Singles
+from rollcli.estimator.moments import Singles, strips
+from rollcli.pictures.heights import METRES
 
 Pixels = NDArray[np.uint8]
 
@@ -21,7 +22,7 @@ def round_step(least: float) -> float:
 
 _ROAD = (220, 230, 40)  # BGR
 _TINT = 0.5
-_BLOCK = 2**20  # pixels
+_BLOCK = 2**20  # pixels at a time: what they need is large in large maps
 BAR_WIDTH = 64  # of the colour bar, pixels
 _LABEL_EVERY = 50  # pixels along the bar
 _INK = (60, 60, 60)
@@ -158,13 +159,10 @@ def _levels(disparity: NDArray[Any]) -> Pixels:
     """Return 0 for no data, 1..255 for small to large disparities."""
     values = np.asarray(disparity)
     top, levels = brightest(values), np.empty(values.shape, np.uint8)
-    step = max(1, _BLOCK // max(1, values.shape[1]))  # a few rows at a time, for the memory of large maps
-    for first in range(0, len(values), step):
-        some = values[first : first + step]
+    for rows in strips(len(values), _BLOCK // max(1, values.shape[1])):
+        some = values[rows]
         valid = np.isfinite(some) & (some > 0)
-        levels[first : first + step] = np.where(
-            valid, np.clip(np.where(valid, some, 0) * (255 / top), 1, 255), 0
-        )
+        levels[rows] = np.where(valid, np.clip(np.where(valid, some, 0) * (255 / top), 1, 255), 0)
     return levels
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
-from rollcli.estimator.moments import map_of
+from rollcli.estimator.moments import map_of, strips
 from rollcli.pictures.overlay import Pixels, round_step
 
 _MAX_BINS = 1024
@@ -62,8 +62,7 @@ def v_disparity(
     values = map_of(disparity)
     if values.ndim != 2 or values.dtype.kind not in "fiub":
         raise UsageError(f"a disparity map is 2-D and real, not of shape {values.shape} and {values.dtype}")
-    step = max(1, _BLOCK // max(1, values.shape[1]))
-    blocks = [values[top : top + step] for top in range(0, len(values), step)]
+    blocks = [values[rows] for rows in strips(len(values), _BLOCK // max(1, values.shape[1]))]
     if max_disparity is None:
         max_disparity = math.floor(max((_pixels(each).max(initial=0) for each in blocks), default=0)) + 1.0
     if not 0 < max_disparity < math.inf or (bins is not None and bins < 1):

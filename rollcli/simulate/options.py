@@ -20,9 +20,43 @@ KERB = (0.10, 0.20)
 MAX_DIPS = 12
 
 
+@dataclass(frozen=True, kw_only=True)
+class Rendering:
+    """What every frame of a simulation has as it is asked for.
+
+    Attributes
+    ----------
+    roughness : str or None
+        The class of ISO 8608, one of `ROUGHNESS`; None: a smooth road.
+    dips : int or None
+        How many dips and bumps the lane ahead has, as far as there is room; None: none, and no true heights.
+    size : tuple of int
+        Width and height, pixels.
+    principal_point : tuple of float or None
+        Column and row, pixels from the centre of the top-left pixel; None: the image's centre.
+    baseline : float
+        Metres.
+    noise : float
+        Standard deviation of the sensor's noise, grey levels of 255.
+    gain : float
+        Brightness of the right view relative to the left one.
+    seed : int
+        The random content is drawn from this and the frame's number.
+    """
+
+    roughness: str | None = None
+    dips: int | None = None
+    size: tuple[int, int] = (640, 480)
+    principal_point: tuple[float, float] | None = None
+    baseline: float = 0.54
+    noise: float = 1.5
+    gain: float = 1.0
+    seed: int = 0
+
+
 @dataclass(frozen=True)
-class SimulateOptions:
-    """What to render, as `rollcli simulate` is asked.
+class SimulateOptions(Rendering):
+    """What to render, as `rollcli simulate` is asked; the rest of a frame is drawn.
 
     Attributes
     ----------
@@ -46,27 +80,14 @@ class SimulateOptions:
         Lowest and highest further slope in the gutters, per cent.
     kerb : tuple of float or None
         Lowest and highest kerb, metres; None: `KERB`.
-    roughness : str or None
-        One of `ROUGHNESS`; None: a smooth road.
-    dips : int or None
-        How many dips and bumps each road has; None: none, and no true heights.
-    size : tuple of int
-        Width and height, pixels.
     focal : float or None
         Pixels; None: `FOCAL_PER_WIDTH` times the width.
-    principal_point : tuple of float or None
-        Column and row, pixels; None: the image's centre.
     principal_offset : tuple of float
         Lowest and highest offset of the principal point in each direction, pixels.
-    baseline : float
-        Metres.
     height : tuple of float
         Lowest and highest height of the left camera, metres.
-    noise, gain : float
-        See `FrameSpec`.
     grey : bool
         One channel instead of three.
-    seed : int
     resume : bool
         Keep the frames of an interrupted simulation and do the rest.
     """
@@ -81,16 +102,8 @@ class SimulateOptions:
     crossfall: Span | None = None
     gutter: Span = (0.0, 0.0)
     kerb: Span | None = None
-    roughness: str | None = None
-    dips: int | None = None
-    size: tuple[int, int] = (640, 480)
     focal: float | None = None
-    principal_point: tuple[float, float] | None = None
     principal_offset: Span = (0.0, 0.0)
-    baseline: float = 0.54
     height: Span = (1.65, 1.65)
-    noise: float = 1.5
-    gain: float = 1.0
     grey: bool = False
-    seed: int = 0
     resume: bool = False

@@ -1,7 +1,7 @@
 """What one simulated frame is, on which all of its bytes depend, and how frames are drawn from ranges."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 
 import numpy as np
@@ -14,6 +14,7 @@ from rollcli.simulate.options import (
     KERB,
     MIXED,
     SCENES,
+    Rendering,
     SimulateOptions,
     Span,
 )
@@ -36,8 +37,8 @@ class Stream(IntEnum):
 
 
 @dataclass(frozen=True)
-class FrameSpec:
-    """The parameters of one frame; equal specs give equal bytes.
+class FrameSpec(Rendering):
+    """The parameters of one frame, beside those that all have; equal specs give equal bytes.
 
     Parameters
     ----------
@@ -57,28 +58,16 @@ class FrameSpec:
         How much more steeply the carriageway falls outward in its gutters, metres per metre.
     kerb : tuple of float
         The lowest and the highest kerb, metres above the edge of the carriageway.
-    roughness : str or None
-        The class of ISO 8608, one of `ROUGHNESS`; None: a smooth road.
     bend : float or None
         Horizontal curvature of the road, 1/m; positive bends to the right. None: drawn with the scene.
-    dips : int or None
-        How many dips and bumps the lane ahead has, as far as there is room; None: none, and no true heights.
-    size : tuple of int
-        Width and height, pixels.
     focal : float
         Focal length, pixels.
-    principal_point : tuple of float or None
-        Column and row, pixels from the centre of the top-left pixel; None: the image's centre.
-    baseline, height : float
-        Metres; the height is that of the left camera over the plane that touches the road below it.
-    noise : float
-        Standard deviation of the sensor's noise, grey levels of 255.
-    gain : float
-        Brightness of the right view relative to the left one.
+    height : float
+        Of the left camera over the plane that touches the road below it, metres.
     colour : bool
         Three channels (BGR) or one.
-    seed, index : int
-        The random content is drawn from these two.
+    index : int
+        The frame's number.
     """
 
     scene: str = "street"
@@ -89,18 +78,10 @@ class FrameSpec:
     crossfall: float = 0.0
     gutter: float = 0.0
     kerb: Span = KERB
-    roughness: str | None = None
     bend: float | None = None
-    dips: int | None = None
-    size: tuple[int, int] = SimulateOptions.size
-    focal: float = FOCAL_PER_WIDTH * SimulateOptions.size[0]
-    principal_point: tuple[float, float] | None = None
-    baseline: float = SimulateOptions.baseline
+    focal: float = FOCAL_PER_WIDTH * Rendering.size[0]
     height: float = SimulateOptions.height[0]
-    noise: float = SimulateOptions.noise
-    gain: float = 1.0
     colour: bool = True
-    seed: int = 0
     index: int = 0
 
     def __post_init__(self) -> None:
@@ -140,17 +121,10 @@ def draw_specs(options: SimulateOptions) -> list[FrameSpec]:
         Values contradict each other.
     """
     rig = FrameSpec(
-        size=options.size,
+        **{each.name: getattr(options, each.name) for each in fields(Rendering)},
         focal=FOCAL_PER_WIDTH * options.size[0] if options.focal is None else options.focal,
-        principal_point=options.principal_point,
-        baseline=options.baseline,
-        noise=options.noise,
-        gain=options.gain,
         colour=not options.grey,
         kerb=options.kerb or KERB,
-        roughness=options.roughness,
-        dips=options.dips,
-        seed=options.seed,
     )
     for end in (0, 1):  # what is not possible is refused, whatever would be drawn
         roll, pitch = math.radians(options.roll_deg[end]), math.radians(options.pitch_deg[end])

@@ -302,28 +302,37 @@ def _is_plainly_level(found: Misalignment, fit: RowFit, shape: tuple[int, ...]) 
     return is_level(found.times(_HIDDEN), fit.errors, shape)
 
 
-@dataclass(frozen=True)
-class Tolerance:
+class Tolerance(NamedTuple):
     """What is level enough, beside some standard errors of what was measured.
 
     Level rendered pairs measure up to 0.03 px, 0.008 degrees, 0.04 % and 0.18 px; empty roads with much noise
     up to 0.08 px, 0.024 degrees, 0.07 % and 0.24 px, with standard errors of a sixth of that.
+
+    Attributes
+    ----------
+    offset : float
+        Pixels; turns a road by 0.03 degrees.
+    rotation : float
+        Radians (0.014 degrees); turns a road by 0.03 degrees.
+    scale : float
+        Turns a road by 0.08 degrees.
+    twist : float
+        Pixels in the corners; turns a road by 0.03 degrees.
+    tilt : float
+        Pixels at a disparity of a sixteenth of the width.
+    curve : float
+        Pixels in the first and last row.
+    sure : float
+        Standard errors. Blocks beside each other err together: they are said to err less than they do.
     """
 
     offset: float = 0.06
-    """Pixels; turns a road by 0.03 degrees."""
     rotation: float = 0.00025
-    """Radians (0.014 degrees); turns a road by 0.03 degrees."""
     scale: float = 0.0003
-    """Turns a road by 0.08 degrees."""
     twist: float = 0.15
-    """Pixels in the corners; turns a road by 0.03 degrees."""
     tilt: float = 0.1
-    """Pixels at a disparity of a sixteenth of the width."""
     curve: float = 0.1
-    """Pixels in the first and last row."""
     sure: float = 4.0
-    """Standard errors. Blocks beside each other err together: they are said to err less than they do."""
 
 
 TOLERANCE = Tolerance()
@@ -341,17 +350,10 @@ def is_level(
     lies: Misalignment, errors: Misalignment, shape: tuple[int, ...], tolerance: Tolerance = TOLERANCE
 ) -> bool:
     """Tell whether views of this shape that lie so, with these standard errors, are within a tolerance."""
-    corner, near, edge = Misalignment(twist=1, tilt=1, curve=1).shifts(shape[0], shape[1])[3:]
-    limits = (
-        tolerance.offset,
-        tolerance.rotation,
-        tolerance.scale,
-        tolerance.twist / corner,
-        tolerance.tilt / near,
-        tolerance.curve / edge,
-    )
-    parts = zip(lies.parts, errors.parts, limits, strict=True)
-    return all(abs(value) < limit + tolerance.sure * error for value, error, limit in parts)
+    *most, sure = tolerance
+    units = 1, 1, 1, *Misalignment(twist=1, tilt=1, curve=1).shifts(*shape)[3:]
+    parts = zip(lies.parts, errors.parts, most, units, strict=True)
+    return all(abs(value) < limit / unit + sure * error for value, error, limit, unit in parts)
 
 
 def level(right: View, misalignment: Misalignment, near: Map | None = None) -> View:

@@ -313,7 +313,7 @@ def match_pair(
 
 def _agrees(measured: Measured, corrected: Misalignment, shape: tuple[int, ...]) -> bool:
     """Tell whether views that were levelled as a file says are level, but for what refinement takes away."""
-    return is_level(measured.misalignment - corrected, measured.errors, shape, replace(_KEPT, sure=4.0))
+    return is_level(measured.misalignment - corrected, measured.errors, shape, _KEPT._replace(sure=4.0))
 
 
 def _look_as_given(views: Views, options: StereoOptions) -> FirstLook:

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rollcli.estimator.moments import strips
 from rollcli.stereo.misalignment import LEVEL, Misalignment
 from rollcli.stereo.sgbm import STEEPEST
 from rollcli.stereo.views import BLOCK, View, Views, block_means, blocks_at, sampled, seen_at
@@ -70,9 +71,7 @@ def refined(disparity: Floats, views: Views, lies: Misalignment = LEVEL) -> Floa
     left, right = views[0], views[1].astype(np.float32)
     gradient = cv2.Sobel(left, cv2.CV_32F, 1, 0, ksize=1, scale=0.5).astype(np.float32, copy=False)
     shifts = np.zeros((height, width), np.float32)
-    many = max(1, _TOGETHER // (width * BLOCK**2))
-    for top in range(0, height, many):
-        rows = slice(top, top + many)
+    for rows in strips(height, _TOGETHER // (width * BLOCK**2)):
         if planes.told[rows].any():
             shifts[rows][planes.told[rows]] = _found(left, gradient, right, planes, rows, lies)
     result = disparity.copy()

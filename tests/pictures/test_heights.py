@@ -18,7 +18,7 @@ def road_of(theta, level, rise, bend, camber):
     """A road whose parabola is given about the map's centre, and the same as the estimator's model of it."""
     centre = CENTRE[1] * math.cos(theta) - CENTRE[0] * math.sin(theta)
     alpha = (level - rise * centre + bend * centre**2, rise - 2 * bend * centre, bend)
-    road = FittedRoad(theta, alpha, camber, WIDTH, HEIGHT)
+    road = FittedRoad(RoadModel(theta, alpha, camber), WIDTH, HEIGHT)
     return road, RoadModel(theta, (level, rise, bend), camber)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.road.model import RoadModel
 from rollcli.files.results import Row
 from rollcli.pictures.colours import style_sheet
 from rollcli.pictures.derotate import derotate, rotation_matrix
@@ -85,9 +86,8 @@ def _seen(road, *, box=1.2, noise=0.05, hill=0.0, shape=(200, 320)):
 
 
 def _heights(name, **options):
-    theta, alpha, camber = ROADS[name]
     disparity = _seen(ROADS[name], **options)
-    road = FittedRoad(theta, alpha, camber, *disparity.shape[::-1])
+    road = FittedRoad(RoadModel(*ROADS[name]), *disparity.shape[::-1])
     return {each: heights_over(disparity, road, rig) for each, rig in RIGS.items()}
 
 

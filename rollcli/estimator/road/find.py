@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.least_squares import solve_normal
-from rollcli.estimator.moments import Floats
+from rollcli.estimator.moments import Floats, Singles
 from rollcli.estimator.road.model import RoadModel
-from rollcli.estimator.road.sample import Sample, Singles, every, quantile, take_sample
+from rollcli.estimator.road.sample import Sample, every, quantile, take_sample
 from rollcli.estimator.tuning import TUNING, SearchTuning, Tuning
 
 HARDLY_A_PIXEL = "no road: hardly a pixel lies on the best plane that was found"

@@ -3,19 +3,19 @@
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.moments import Grid
+from rollcli.estimator.moments import Grid, Singles
 from rollcli.estimator.tuning import SampleTuning
-
-Singles = NDArray[np.float32]
 
 NO_STEP = np.float32(np.inf)  # to a neighbour without data: it agrees with no road
 LEAST_PIXELS = 50  # away from the border; fewer hold no road
+_LEAST_VALUES = 12  # that have a median
 _SMALLEST, _LARGEST = 1e-12, 1e12  # typical disparities whose squares single precision can add up
 _STEEP = np.float32(1e6)  # times the largest disparity; squares of slopes stay finite
 
@@ -229,6 +229,14 @@ def quantile(values: NDArray[np.floating[Any]], part: float) -> float:
     place, values = int(len(values) * part), values.copy()
     values.partition(place)
     return float(values[place])
+
+
+def medians_of(place: NDArray[np.uint16], values: Singles, bins: int) -> list[float]:
+    """Return the medians of values in bins, by the place of each; NaN where a bin has too few of them."""
+    ordered = values[place.argsort(kind="stable")]
+    ends = np.bincount(place, minlength=bins).cumsum().tolist()
+    parts = (ordered[first:end] for first, end in pairwise((0, *ends)))
+    return [quantile(part, 0.5) if len(part) >= _LEAST_VALUES else math.nan for part in parts]
 
 
 def reach_of(height: int, width: int, tuning: SampleTuning) -> int:

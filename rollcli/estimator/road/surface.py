@@ -8,7 +8,6 @@ in camera heights, are relative differences of disparity: h = d / road - 1. Noth
 so that a kerb that is a little lower, or half a bin farther away, turns the angle a little and not at once.
 """
 
-import itertools
 import math
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -19,10 +18,18 @@ from numpy.typing import NDArray
 from rollcli.errors import EstimationError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.least_squares import solve_normal
-from rollcli.estimator.moments import Floats, Grid, powers
+from rollcli.estimator.moments import Floats, Grid, Singles, powers, strips
 from rollcli.estimator.road.find import HARDLY_A_PIXEL, Road, agreement
 from rollcli.estimator.road.model import Reals, RoadModel
-from rollcli.estimator.road.sample import Sample, Singles, count, quantile, reach_of, steps_to, tolerance_of
+from rollcli.estimator.road.sample import (
+    Sample,
+    count,
+    medians_of,
+    quantile,
+    reach_of,
+    steps_to,
+    tolerance_of,
+)
 from rollcli.estimator.tuning import FitTuning, Tuning
 
 MOST_FADED = 30.0  # as exp(-30): products of such weights are no denormals, which take ten times as long
@@ -90,11 +97,10 @@ class Surface:
         height, width = disparity.shape
         reach = min(reach_of(height, width, tuning.sample), height - 1)
         covered = np.empty(disparity.shape, bool)
-        step = max(1, _BLOCK // width)  # a few rows at a time: a large map leaves no room for eight more
-        for top in range(0, height, step):
-            first, end = max(0, top - reach), min(height, top + step)
-            some = disparity[first : min(height, end + reach)]
-            covered[top:end] = self._covers(some, first, reach, tuning)[top - first : end - first]
+        for rows in strips(height, _BLOCK // width):  # a large map leaves no room for eight more
+            first = max(0, rows.start - reach)
+            some = self._covers(disparity[first : rows.stop + reach], first, reach, tuning)
+            covered[rows] = some[rows.start - first : rows.stop - first]
         return covered
 
     def _covers(self, disparity: NDArray[Any], first: int, reach: int, tuning: Tuning) -> NDArray[np.bool_]:
@@ -255,19 +261,10 @@ class NearPixels:
         across, along = lane.turned(self.places)
         road = np.maximum(lane.disparity_along(along), self.d / 10)
         side = lane.side(across, road)
-        places = np.floor(side / np.float32(2 * tuning.profile / _BINS)) + (_BINS + 1)
-        places = np.minimum(np.maximum(places, 0), 2 * _BINS + 1)
-        places *= (self.place > 0.1) & (road > self.d / 10)  # the first is beyond all bins
-        places = places.astype(np.uint16)
-        order = places.argsort(kind="stable")
-        heights = (self.d / road - 1)[order]
-        bounds = places[order].searchsorted(np.arange(1, 2 * _BINS + 2, dtype=np.uint16)).tolist()
-        medians = [math.nan] * (2 * _BINS)
-        for place, (low, high) in enumerate(itertools.pairwise(bounds)):
-            if high - low >= 12:
-                some, middle = heights[low:high], (high - low) // 2
-                some.partition(middle)
-                medians[place] = float(some[middle])
+        places = np.floor(side / np.float32(2 * tuning.profile / _BINS)) + _BINS
+        seen = (self.place > 0.1) & (road > self.d / 10) & (places >= 0) & (places < 2 * _BINS)
+        seen = seen.nonzero()[0]
+        medians = medians_of(places[seen].astype(np.uint16), self.d[seen] / road[seen] - 1, 2 * _BINS)
         medians[_BINS - 2 : _BINS + 2] = [0.0] * 4  # the lane is level
         for place in range(_BINS - 3, -1, -1):  # and where nothing is seen it goes on outward
             for here, inner in ((place, place + 1), (2 * _BINS - 1 - place, 2 * _BINS - 2 - place)):

@@ -207,7 +207,7 @@ class Fit:
     @property
     def evidence(self) -> float:
         """The logarithm of the likelihood of the design, whatever the noise."""
-        return float(_log_sum(self.log_evidence.ravel()))
+        return float(np.logaddexp.reduce(self.log_evidence, axis=None))
 
     def estimate(self, contrast: Sequence[float] | Floats) -> Estimate:
         """Return a combination of the coefficients, with the 95 % interval of the mixture."""
@@ -290,7 +290,7 @@ class Likelihood:
         known = own > 1e-9 * self._own_of_steps.max(axis=-1, keepdims=True)
         safe = np.where(known, own, 1.0)
         gain = np.where(known, left**2 / safe / 2 - np.log(safe) / 2 - math.log(self._unit), -np.inf)
-        return _log_sum((fit.log_evidence[..., None] + gain).reshape(-1, gain.shape[-1]))
+        return np.asarray(np.logaddexp.reduce(fit.log_evidence[..., None] + gain, axis=(0, 1)))
 
     def pairs(self, design: Floats, fit: Fit) -> Floats:
         """Return the gain of two more steps in log likelihood, shape (C, C), with the likeliest noise.
@@ -321,9 +321,3 @@ class Likelihood:
         """Weigh products of rotated columns, shape (P, C, ...), for every noise: (P, G, ...)."""
         flat = self._weights @ columns.reshape(*columns.shape[:2], -1)
         return np.asarray(flat.reshape(*flat.shape[:2], *columns.shape[2:]))
-
-
-def _log_sum(logs: Floats) -> Floats:
-    """Return the logarithm of the sum over the first axis."""
-    most = np.maximum(logs.max(axis=0), -1e300)
-    return np.asarray(most + np.log(np.maximum(np.exp(logs - most).sum(axis=0), 1e-300)))
