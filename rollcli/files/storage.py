@@ -196,43 +196,42 @@ def write_bytes(location: str, data: bytes, *, durable: bool = False, owner: str
     objects.write_object(location, data, owner)
 
 
-def write_new(location: str, data: bytes) -> None:
-    """Write a file or an object, whole or not at all; what another program wrote is not replaced.
+def create(location: str, data: bytes, owner: str = "", *, durable: bool = True) -> bool:
+    """Write a file or an object unless there is one of this name; return whether this owner wrote it.
 
-    Nothing is in the way if it holds these very bytes, or, on local disk, as many of them as a power cut left
-    of an earlier write: the first ones, and zeros where the rest should be.
+    A file that holds these very bytes counts as this owner's; and where files need not be durable, one that
+    holds as many of them as a power cut left of an earlier write: the first ones, and zeros where the rest
+    should be.
 
     Parameters
     ----------
     location : str
         A path, or a URL of an object store.
     data : bytes
+    owner : str
+        Names who writes an object, by default whoever writes these bytes. A store may have taken a request
+        whose answer was lost; when the request is repeated, this name tells our own object from another's.
+    durable : bool
+        Whether a file survives a power cut once this returns, as an object always does.
 
     Raises
     ------
     OutputError
-        It cannot be written, or something else has its name.
+        It cannot be written.
     """
     if is_url(location):
         _require_writable(location)
-        if not objects.create_object(location, data, hashlib.sha256(data).hexdigest()):
-            raise _taken(location)
-        return
+        return objects.create_object(location, data, owner or hashlib.sha256(data).hexdigest())
     try:
-        write_atomic(location, data, replaces=False)
+        write_atomic(location, data, durable=durable, replaces=False)
     except NameTakenError:
         there = _beginning_of(location, len(data))
-        if there is None or not data.startswith(there.rstrip(b"\0")):
-            raise _taken(location) from None
-        if there != data:
-            write_atomic(location, data)
-
-
-def _taken(location: str) -> OutputError:
-    return OutputError(
-        f"{public_name(location)}: exists already and is not of this run; move it away, or give --overwrite "
-        "to replace it"
-    )
+        if there == data:  # by a worker that died before it could say so, perhaps
+            return True
+        if durable or there is None or not data.startswith(there.rstrip(b"\0")):
+            return False
+        write_atomic(location, data)
+    return True
 
 
 def _beginning_of(path: str, size: int) -> bytes | None:
@@ -243,35 +242,6 @@ def _beginning_of(path: str, size: int) -> bytes | None:
         return _read_file(path, path)
     except (OSError, InputError):
         return None
-
-
-def create(location: str, data: bytes, owner: str) -> bool:
-    """Write a file or an object unless there is one of this name; return whether this owner wrote it.
-
-    A file that holds these very bytes counts as this owner's.
-
-    Parameters
-    ----------
-    location : str
-        A path, or a URL of an object store.
-    data : bytes
-    owner : str
-        Names who writes. A store may have taken a request whose answer was lost; when the request is
-        repeated, this name tells our own object from another's.
-
-    Raises
-    ------
-    OutputError
-        It cannot be written.
-    """
-    if not is_url(location):
-        try:
-            write_atomic(location, data, durable=True, replaces=False)
-        except NameTakenError:  # by a worker that died before it could say so, perhaps
-            return _beginning_of(location, len(data)) == data
-        return True
-    _require_writable(location)
-    return objects.create_object(location, data, owner)
 
 
 def list_names(folder: str) -> list[str]:

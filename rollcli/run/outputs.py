@@ -16,7 +16,7 @@ from rollcli.files import storage
 from rollcli.files.atomic import is_folder, mark_path, remove_leftovers
 from rollcli.files.containers import file_of, shown
 from rollcli.files.results import STATUSES
-from rollcli.files.storage import read_bytes, remove, remove_all, write_bytes, write_new
+from rollcli.files.storage import create, read_bytes, remove, remove_all, write_bytes
 from rollcli.files.stores.locations import is_object_url, is_url, located, public_name, split_url
 from rollcli.files.stores.objects import list_objects
 from rollcli.files.stream import STDOUT, open_stream
@@ -90,7 +90,7 @@ def write_outputs(
     if retry_of and not replaces:
         _write_marked(files, paths, retry_of)
         return
-    write = write_bytes if replaces else write_new
+    write = write_bytes if replaces else _write_new
     for path, data in files.items():
         write(path, data)
     if replaces:
@@ -98,6 +98,14 @@ def write_outputs(
             if path not in files:
                 with contextlib.suppress(OutputError):  # the row says what is wrong with the frame
                     remove(path)
+
+
+def _write_new(path: str, data: bytes) -> None:
+    if not create(path, data, durable=False):
+        raise OutputError(
+            f"{public_name(path)}: exists already and is not of this run; move it away, or give --overwrite "
+            "to replace it"
+        )
 
 
 def _write_marked(files: Mapping[str, bytes], paths: Collection[str], result: str) -> None:
@@ -108,7 +116,7 @@ def _write_marked(files: Mapping[str, bytes], paths: Collection[str], result: st
     for path, data in files.items():
         write_bytes(mark_path(path), _mark(data, result))
         try:
-            write_new(path, data)
+            _write_new(path, data)
         except OutputError:
             remove(mark_path(path))
             raise
