@@ -259,15 +259,6 @@ def list_names(folder: str) -> list[str]:
         raise InputError(f"{folder}: cannot be read: {cause_of(error)}") from error
 
 
-def exists(location: str) -> bool:
-    """Return whether there is a file or an object of this name."""
-    if not is_url(location):
-        return os.path.lexists(location)
-    if scheme_of(location) in WEB_SERVERS:
-        return True  # asking costs as much as reading; reading says what is wrong
-    return objects.object_exists(location)
-
-
 def remove(location: str) -> None:
     """Remove a file or an object; none of this name is no error.
 

@@ -19,7 +19,7 @@ _REQUEST_S = 60.0  # a map of 10 MB at 1.4 Mbit/s takes as long
 DENIED = "access is denied; check the rights of these keys"
 _NO_BUCKET = "there is no such bucket"
 _EXPIRED = "the keys have expired; fetch new ones"
-_NO_OBJECT = "there is no such object"
+NO_OBJECT = "there is no such object"
 _CUT = "the answer of the store was cut short"
 _REFUSED = "the store refused the request"
 _ANSWERED = "the store answered"
@@ -100,7 +100,7 @@ def what_is_missing(error: Exception) -> str:
     """Tell a bucket that does not exist from an object."""
     text = _without_names(error)
     missing = any(f"<Code>{each}</Code>" in text for each in ("NoSuchBucket", "ContainerNotFound"))
-    return _NO_BUCKET if missing else _NO_OBJECT
+    return _NO_BUCKET if missing else NO_OBJECT
 
 
 def is_final(error: Exception) -> bool:
@@ -115,7 +115,7 @@ def is_final(error: Exception) -> bool:
 
 def holds_for_all(reason: str) -> bool:
     """Tell whether what a store objects to holds for every object of its bucket."""
-    of_one = reason in (DENIED, _NO_OBJECT, _CUT, _REFUSED) or reason.startswith(_ANSWERED)
+    of_one = reason in (DENIED, NO_OBJECT, _CUT, _REFUSED) or reason.startswith(_ANSWERED)
     return not of_one
 
 
@@ -193,21 +193,6 @@ def object_owner(url: str) -> str:
     with _telling(url, "read", InputError), contextlib.suppress(FileNotFoundError):
         return str(_repeated(lambda: store.get(key).attributes.get(_OWNER, "")))
     return ""
-
-
-def object_exists(url: str) -> bool:
-    """Return whether there is an object of this name.
-
-    Raises
-    ------
-    InputError
-        The store does not answer, or does not let us look.
-    """
-    store, key = _open(url)
-    with _telling(url, "read", InputError), contextlib.suppress(FileNotFoundError):
-        _repeated(lambda: store.head(key))
-        return True
-    return False
 
 
 def object_problem(url: str) -> str:
