@@ -68,7 +68,7 @@ def objects_behind(url: str, *, recursive: bool) -> Iterator[tuple[str, str]]:
     if glob.has_magic(url):
         base = url[: url.rindex("/", 0, _MAGIC.search(url).start()) + 1]  # type: ignore[union-attr]
         pattern = url.removeprefix(base).split("/")
-    for found, _ in list_objects(base):
+    for found, *_ in list_objects(base):
         relative = found.removeprefix(base)
         fits = _fits(relative.split("/"), pattern) if pattern else recursive or "/" not in relative
         hidden = any(part.startswith(".") for part in relative.split("/"))

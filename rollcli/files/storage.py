@@ -59,7 +59,7 @@ def noting(wanted: bool = True) -> Iterator[dict[str, Note]]:
 def state_of(location: str) -> str:
     """Return size and time of a file, or of the file that a frame lies in; empty where nothing tells them.
 
-    Of an object, `read_frame` notes the entity tag, which listings have too (`objects.list_tags`).
+    Of an object, `read_frame` notes the entity tag, which listings have too (`objects.list_objects`).
     """
     if is_url(location):
         return ""
@@ -250,7 +250,7 @@ def list_names(folder: str) -> list[str]:
         if scheme_of(folder) in WEB_SERVERS:
             return []  # a web server cannot be asked
         base = folder.rstrip("/") + "/"
-        return [url.removeprefix(base) for url, _ in objects.list_objects(base)]
+        return [url.removeprefix(base) for url, *_ in objects.list_objects(base)]
     try:
         return [path.name for path in Path(folder).iterdir()]
     except (FileNotFoundError, NotADirectoryError):

@@ -272,7 +272,7 @@ class Existing:
         folder = next((each for each in self._listed if path.startswith(each)), None)
         if folder is None:
             folder = path[: path.rindex("/") + 1] if path.count("/") > root.count("/") + 1 else f"{root}/"
-            self._listed[folder] = {found for found, size in list_objects(folder) if size or not self._filled}
+            self._listed[folder] = {url for url, size, _ in list_objects(folder) if size or not self._filled}
         return path in self._listed[folder]
 
 

@@ -247,8 +247,8 @@ def remove_object(url: str) -> None:
         _repeated(lambda: store.delete(key))
 
 
-def list_objects(url: str) -> Iterator[tuple[str, int]]:
-    """Yield the URL and size of each object below a prefix, in the store's order.
+def list_objects(url: str) -> Iterator[tuple[str, int, str]]:
+    """Yield URL, size and entity tag of each object below a prefix, in the store's order.
 
     Parameters
     ----------
@@ -260,20 +260,11 @@ def list_objects(url: str) -> Iterator[tuple[str, int]]:
     UsageError
         There is no such bucket, or it may not be listed.
     """
-    return ((found, meta["size"]) for found, meta in _list(url))
-
-
-def list_tags(url: str) -> Iterator[tuple[str, str]]:
-    """Yield the URL and entity tag of each object below a prefix, as `list_objects` does its size."""
-    return ((found, meta["e_tag"] or "") for found, meta in _list(url))
-
-
-def _list(url: str) -> Iterator[tuple[str, Any]]:
     store, prefix = _open(url)
     root = split_url(url)[0]
     with _telling(url, "listed", UsageError):
         for found in _listed(store, prefix.rstrip("/") or None):
-            yield f"{root}/{found['path']}", found
+            yield f"{root}/{found['path']}", found["size"], found["e_tag"] or ""
 
 
 def has_objects(url: str) -> bool:

@@ -88,7 +88,6 @@ DOINGS = {
         *("page last", "page later last", "page denied", "empty"),
     ),
     "list all": (lambda: list(objects.list_objects("s3://maps/")), "last"),
-    "tags": (lambda: list(objects.list_tags("s3://maps/p/")), "page last"),
     "has": (lambda: objects.has_objects("s3://maps/p/"), "last", "empty"),
 }
 
