@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from rollcli.errors import UsageError, as_usage, cause_of
+from rollcli.errors import UsageError, as_usage, reading
 from rollcli.files.bounded import MOST_LISTED, as_utf8, read_given, read_stream
 from rollcli.files.containers import file_of, shown
 from rollcli.files.naming import listed, match_names, natural_key
@@ -24,6 +24,7 @@ _NO_TEXT = (  # what images and archives begin with
     *(b"\xff\xd8\xff", b"PK\x03\x04", b"v/1\x01"),
 )
 _OTHER_SIDE = "name the images of the other camera"
+_LIST = "the list of files"
 _BLOCK = 4096  # lines between two places that are known: 100,000,000 lines have 200 kB of places
 
 
@@ -206,11 +207,8 @@ def _arguments(inputs: Iterable[str], files_from: str | None) -> Iterator[tuple[
         yield from ((line, True) for line in _stdin_lines())
     elif files_from is not None:
         read = read_bytes if is_url(files_from) else read_given
-        try:
-            with as_usage():
-                data = as_utf8(read(files_from, most=MOST_LISTED), files_from)
-        except OSError as error:
-            raise UsageError(f"{files_from}: the list of files cannot be read: {cause_of(error)}") from None
+        with as_usage(), reading(files_from, _LIST):
+            data = as_utf8(read(files_from, most=MOST_LISTED), files_from)
         yield from ((line, True) for line in _lines(data))
 
 
@@ -281,15 +279,12 @@ class Manifest:
     def _lines(self, offset: int, places: "array[int] | None" = None) -> Iterator[tuple[int, str]]:
         """Yield each name from an offset on, and the number of its line there; note where blocks begin."""
         count = 0
-        try:
-            with Path(self._path).open("rb") as file:
-                file.seek(offset)
-                for number, line in enumerate(file, 1):
-                    if name := line.rstrip(b"\r\n"):
-                        if places is not None and count % _BLOCK == 0:
-                            places.append(offset)
-                        count += 1
-                        yield number, os.fsdecode(name)
-                    offset += len(line)
-        except OSError as error:
-            raise UsageError(f"{self._path}: the list of files cannot be read: {cause_of(error)}") from error
+        with reading(self._path, _LIST, UsageError), Path(self._path).open("rb") as file:
+            file.seek(offset)
+            for number, line in enumerate(file, 1):
+                if name := line.rstrip(b"\r\n"):
+                    if places is not None and count % _BLOCK == 0:
+                        places.append(offset)
+                    count += 1
+                    yield number, os.fsdecode(name)
+                offset += len(line)

@@ -14,7 +14,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, Literal, get_args, get_type_hints
 
-from rollcli.errors import InputError, UsageError, cause_of
+from rollcli.errors import InputError, UsageError, reading
 from rollcli.extras import require_extra
 from rollcli.files.bounded import as_utf8, read_given, read_stream
 from rollcli.files.storage import list_names, read_bytes
@@ -475,10 +475,8 @@ def read_named(path: str | Path) -> bytes:
     """
     if is_url(str(path)):
         return read_bytes(path)
-    try:
+    with reading(path):
         return read_stream(sys.stdin.buffer, STDIN) if str(path) == STDIN else read_given(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {cause_of(error)}") from error
 
 
 # what lies outside is another program's idea of a roll

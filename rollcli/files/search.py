@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rollcli.errors import UsageError
+from rollcli.errors import UsageError, reading
 from rollcli.files.atomic import is_file, is_folder, mode_of
 from rollcli.files.containers import frame_name, is_archive, members, refuse_packed
 from rollcli.files.stores.locations import (
@@ -320,11 +320,8 @@ def _matches(pattern: str) -> Iterator[str]:
 
 
 def _entries(folder: str) -> list[os.DirEntry[str]]:
-    try:
-        with os.scandir(folder) as entries:
-            return list(entries)
-    except OSError as error:
-        raise UsageError(f"{folder}: this folder cannot be read: {(error.strerror or '').lower()}") from None
+    with reading(folder, "this folder", UsageError), os.scandir(folder) as entries:
+        return list(entries)
 
 
 def _identity(folder: str | Path) -> tuple[int, int]:

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rollcli.errors import InputError, OutputError, cause_of
+from rollcli.errors import InputError, OutputError, reading
 from rollcli.files import bounded
 from rollcli.files.atomic import NameTakenError, in_threads, write_atomic, writing
 from rollcli.files.bounded import MOST_BYTES, too_large
@@ -251,12 +251,9 @@ def list_names(folder: str) -> list[str]:
             return []  # a web server cannot be asked
         base = folder.rstrip("/") + "/"
         return [url.removeprefix(base) for url, *_ in objects.list_objects(base)]
-    try:
+    with reading(folder), contextlib.suppress(FileNotFoundError, NotADirectoryError):
         return [path.name for path in Path(folder).iterdir()]
-    except (FileNotFoundError, NotADirectoryError):
-        return []
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be read: {cause_of(error)}") from error
+    return []
 
 
 def remove(location: str) -> None:
