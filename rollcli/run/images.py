@@ -132,7 +132,7 @@ def _v_disparity(path: str, of: Pictured) -> _Named:
 
 
 def _disparity(path: str, of: Pictured) -> _Named:
-    return encode_computed(path, of.source.shown, of.options.images.save_as, of.source.provenance.text)
+    return encode_computed(path, of.source.shown, of.options.images.save_as, of.source.text)
 
 
 def _road_mask(path: str, of: Pictured) -> _Named:
@@ -270,7 +270,7 @@ def _matched(source: Source, of: Conversion, options: DisparityOptions, paths: S
     """Encode the disparity map of the pair, and draw it if that was requested."""
     if not np.any(source.disparity):
         raise InputError(f"{of.frame.file}: no pixel could be matched with the right image")
-    path, data = encode_computed(paths[0], source.shown, options.save_as, source.provenance.text)
+    path, data = encode_computed(paths[0], source.shown, options.save_as, source.text)
     files = {path: data}
     if options.preview is not None:
         files[paths[-1]] = encode_png(draw_preview(source.shown))
