@@ -21,7 +21,7 @@ from rollcli.files.stores.locations import is_object_url, is_url, located, publi
 from rollcli.files.stores.objects import list_objects
 from rollcli.files.stream import STDOUT, open_stream
 from rollcli.run.frame import Frame
-from rollcli.run.options import ENDING_OF_FORMAT, ImageKind, ImageOptions, RunningOptions
+from rollcli.run.options import ENDING_OF_FORMAT, ConvertOptions, ImageKind, ImageOptions, RunningOptions
 
 
 def image_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[ImageKind, str]]:
@@ -57,6 +57,11 @@ def output_path(frame: Frame, folder: str, ending: str | None = None) -> str:
     """Name the file of a frame below `folder`; it keeps the frame's own ending unless one is given."""
     name = frame.relative if ending is None else posixpath.splitext(frame.relative)[0] + ending
     return f"{folder}{name}" if folder.endswith("/") else f"{folder}/{name}"
+
+
+def paths_of(frame: Frame, options: ConvertOptions) -> list[str]:
+    """List the files that a conversion may write for a frame; none of one whose URL names no file."""
+    return [output_path(frame, *each) for each in options.writes] if frame.relative else []
 
 
 def every_path(frame: Frame, images: ImageOptions, root: str = "") -> list[str]:
