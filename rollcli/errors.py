@@ -6,6 +6,7 @@ Every message is one line and says what to do.
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import IntEnum
+from pathlib import Path
 from types import TracebackType
 
 
@@ -64,6 +65,18 @@ class OutputError(RollcliError):
 def cause_of(error: OSError) -> str:
     """Return what the system says of an error, as the end of a sentence."""
     return (error.strerror or str(error)).lower()
+
+
+@contextmanager
+def reading(name: str | Path, subject: str = "", kind: type[RollcliError] = InputError) -> Iterator[None]:
+    """Take what the system refuses within the block for a failed read of what has this name.
+
+    `subject` is in its sentence what cannot be read, where the name alone does not tell.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise kind(f"{name}: {subject and f'{subject} '}cannot be read: {cause_of(error)}") from error
 
 
 def raised_at(error: BaseException) -> TracebackType | None:

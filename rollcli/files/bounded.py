@@ -6,7 +6,7 @@ import stat
 from pathlib import Path
 from typing import BinaryIO
 
-from rollcli.errors import InputError, cause_of
+from rollcli.errors import InputError, reading
 from rollcli.files.atomic import look_at
 
 # The largest map or picture that is decoded takes 512 MB (codecs/raw_map); a result of a million rows 200 MB
@@ -38,10 +38,8 @@ def state_of(path: str) -> tuple[str, int, int, int]:
     InputError
         It cannot be read.
     """
-    try:
+    with reading(path):
         found = look_at(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {cause_of(error)}") from None
     return path, found.st_size, found.st_mtime_ns, os.getpid()
 
 

@@ -16,7 +16,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rollcli.errors import InputError, UsageError, as_usage, cause_of
+from rollcli.errors import InputError, UsageError, as_usage, reading
 from rollcli.files.atomic import is_file, is_folder
 from rollcli.files.bounded import most_unpacked, state_of, too_large
 from rollcli.files.naming import natural_key
@@ -128,15 +128,13 @@ def members(path: str) -> Iterator[tuple[str, str]]:
 
 def _tar_members(path: str) -> Iterator[tuple[str, str]]:
     try:
-        with tarfile.open(path, "r:") as archive:
+        with reading(path), tarfile.open(path, "r:") as archive:
             for each in archive:
                 archive.members = []  # type: ignore[attr-defined]  # a shard may have a million of them
                 if each.isreg() and not each.issparse():
                     yield each.name.removeprefix("./"), f"#@{each.offset_data}+{each.size}"
     except (tarfile.TarError, ValueError, EOFError) as error:
         raise InputError(f"{path}: is a damaged archive: {str(error) or 'it ends too early'}") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {cause_of(error)}") from None
 
 
 def read_member(location: str, name: str, most: int) -> "bytes | NDArray[Any] | None":
@@ -153,7 +151,7 @@ def read_member(location: str, name: str, most: int) -> "bytes | NDArray[Any] | 
     if inside is None:
         return None
     path, member = inside
-    try:
+    with reading(name):
         if path.lower().endswith(".tar"):
             return _read_tar(path, member, name, most)
         if path.lower().endswith(BAGS):
@@ -163,8 +161,6 @@ def read_member(location: str, name: str, most: int) -> "bytes | NDArray[Any] | 
 
             return read_video_frame(path, member, name)
         return _read_zip(path, member, name, most)
-    except OSError as error:
-        raise InputError(f"{name}: cannot be read: {cause_of(error)}") from None
 
 
 def _read_bag(path: str, member: str, name: str) -> "bytes | NDArray[Any]":
@@ -217,11 +213,10 @@ def _read_zip(path: str, member: str, name: str, most: int) -> bytes:
 
 def _zip(path: str) -> zipfile.ZipFile:
     try:
-        return _opened_zip(*state_of(path))
+        with reading(path):
+            return _opened_zip(*state_of(path))
     except (zipfile.BadZipFile, ValueError, NotImplementedError):
         raise InputError(f"{path}: is no ZIP archive, or a damaged one") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {cause_of(error)}") from None
 
 
 @lru_cache(maxsize=4)  # its directory is read once by each worker

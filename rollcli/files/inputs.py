@@ -7,14 +7,12 @@ import sys
 from array import array
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
-from rollcli.errors import UsageError, as_usage, cause_of
+from rollcli.errors import UsageError, as_usage, reading
 from rollcli.files.bounded import MOST_LISTED, as_utf8, read_given, read_stream
 from rollcli.files.containers import file_of, shown
-from rollcli.files.naming import listed, match_names, natural_key
+from rollcli.files.naming import Input, listed, match_names, natural_key
 from rollcli.files.search import IMAGE_ENDINGS, Search
 from rollcli.files.storage import read_bytes
 from rollcli.files.stores.locations import base_name, is_url, public_name
@@ -24,38 +22,8 @@ _NO_TEXT = (  # what images and archives begin with
     *(b"\xff\xd8\xff", b"PK\x03\x04", b"v/1\x01"),
 )
 _OTHER_SIDE = "name the images of the other camera"
+_LIST = "the list of files"
 _BLOCK = 4096  # lines between two places that are known: 100,000,000 lines have 200 kB of places
-
-
-@dataclass(frozen=True, slots=True)
-class Input:
-    """A file to work on.
-
-    Attributes
-    ----------
-    location : str
-        Where it is.
-    name : str
-        As the user named it, with "/" separators: what a result's column `file` says.
-    relative : str
-        Its path below the folder or pattern it was found in: where outputs keep it.
-    """
-
-    location: str
-    name: str
-    relative: str
-
-    @property
-    def path(self) -> Path:
-        """Where it is; made when asked for, since a path takes ten times the memory of its text."""
-        return Path(self.location)
-
-
-class Pair(NamedTuple):
-    """A left and a right image that belong together."""
-
-    left: Input
-    right: Input
 
 
 def find_inputs(
@@ -130,7 +98,9 @@ def _shown(location: str) -> str:
     return public_name(location) if is_url(location) else shown(location).replace(os.sep, "/")
 
 
-def pair_inputs(left: str, right: str, search: Search | None = None, *, match: str = "name") -> list[Pair]:
+def pair_inputs(
+    left: str, right: str, search: Search | None = None, *, match: str = "name"
+) -> list[tuple[Input, Input]]:
     """Pair the images of two files, folders or patterns.
 
     Parameters
@@ -146,7 +116,7 @@ def pair_inputs(left: str, right: str, search: Search | None = None, *, match: s
 
     Returns
     -------
-    list of Pair
+    list of (Input, Input)
         In the natural order of the left images.
 
     Raises
@@ -161,14 +131,14 @@ def pair_inputs(left: str, right: str, search: Search | None = None, *, match: s
             raise UsageError(f"{len(lefts)} left and {len(rights)} right images cannot be matched by order")
     elif not len(lefts) == len(rights) == 1:
         return _by_name(lefts, rights)
-    pairs = list(map(Pair, lefts, rights))
+    pairs = list(zip(lefts, rights, strict=True))
     for one, other in pairs:
         if one.path.name == other.path.name and _place(one) == _place(other):
             raise UsageError(f"{one.name}: is given by --left and by --right; {_OTHER_SIDE}")
     return pairs
 
 
-def _by_name(lefts: list[Input], rights: list[Input]) -> list[Pair]:
+def _by_name(lefts: list[Input], rights: list[Input]) -> list[tuple[Input, Input]]:
     same_files = {_place(each) for each in lefts} & {_place(each) for each in rights}
     matched, ambiguous = match_names(
         [each.relative for each in lefts], [each.relative for each in rights], marked=bool(same_files)
@@ -176,7 +146,7 @@ def _by_name(lefts: list[Input], rights: list[Input]) -> list[Pair]:
     if ambiguous is not None:
         rivals = [side[i].name for side, some in zip((lefts, rights), ambiguous, strict=True) for i in some]
         raise UsageError(f"{', '.join(rivals)}: more than one partner; rename them, or use --match order")
-    pairs = [Pair(lefts[i], rights[j]) for i, j in matched]
+    pairs = [(lefts[i], rights[j]) for i, j in matched]
     paired = {_place(each) for pair in pairs for each in pair}
     alone = list(dict.fromkeys(each.name for each in (*lefts, *rights) if _place(each) not in paired))
     if not pairs and set(map(_place, lefts)) == same_files:
@@ -206,11 +176,8 @@ def _arguments(inputs: Iterable[str], files_from: str | None) -> Iterator[tuple[
         yield from ((line, True) for line in _stdin_lines())
     elif files_from is not None:
         read = read_bytes if is_url(files_from) else read_given
-        try:
-            with as_usage():
-                data = as_utf8(read(files_from, most=MOST_LISTED), files_from)
-        except OSError as error:
-            raise UsageError(f"{files_from}: the list of files cannot be read: {cause_of(error)}") from None
+        with as_usage(), reading(files_from, _LIST):
+            data = as_utf8(read(files_from, most=MOST_LISTED), files_from)
         yield from ((line, True) for line in _lines(data))
 
 
@@ -281,15 +248,12 @@ class Manifest:
     def _lines(self, offset: int, places: "array[int] | None" = None) -> Iterator[tuple[int, str]]:
         """Yield each name from an offset on, and the number of its line there; note where blocks begin."""
         count = 0
-        try:
-            with Path(self._path).open("rb") as file:
-                file.seek(offset)
-                for number, line in enumerate(file, 1):
-                    if name := line.rstrip(b"\r\n"):
-                        if places is not None and count % _BLOCK == 0:
-                            places.append(offset)
-                        count += 1
-                        yield number, os.fsdecode(name)
-                    offset += len(line)
-        except OSError as error:
-            raise UsageError(f"{self._path}: the list of files cannot be read: {cause_of(error)}") from error
+        with reading(self._path, _LIST, UsageError), Path(self._path).open("rb") as file:
+            file.seek(offset)
+            for number, line in enumerate(file, 1):
+                if name := line.rstrip(b"\r\n"):
+                    if places is not None and count % _BLOCK == 0:
+                        places.append(offset)
+                    count += 1
+                    yield number, os.fsdecode(name)
+                offset += len(line)

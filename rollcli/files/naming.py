@@ -1,8 +1,10 @@
-"""Read file names: their natural order, and which left image belongs to which right one."""
+"""Inputs and their names: the natural order of these, and which left image belongs to which right one."""
 
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 
 # the marks of a left and of a right image: a word or letter of its own, leftImg8bit, m1_L1, 000123r
 _WORDS = (
@@ -15,6 +17,33 @@ _NUMBERS = ((_NEVER, _NEVER), ("0", "1"), ("2", "3"), ("1", "2"), ("1", "5"), ("
 _NUMBERED = (
     r"((?<![A-Za-z])(?:im|img|image|cam|camera|view)[_-]?|(?<=[A-Za-z0-9])[_-](?=0*{0}$))0*{0}(?![0-9])"
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """A file, or a frame inside of one, to work on.
+
+    Attributes
+    ----------
+    location : str
+        Where it is.
+    name : str
+        As the user named it, with "/" separators: what a result's column `file` says.
+    relative : str
+        Its path below the folder or pattern it was found in: where outputs keep it.
+    stamp : int
+        When a frame of a bag was taken, ns; 0 of others.
+    """
+
+    location: str
+    name: str
+    relative: str
+    stamp: int = 0
+
+    @property
+    def path(self) -> Path:
+        """Where it is; made when asked for, since a path takes ten times the memory of its text."""
+        return Path(self.location)
 
 
 def listed(names: Iterable[str], most: int = 3) -> str:

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import math
+import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -13,11 +14,12 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, Literal, get_args, get_type_hints
 
-from rollcli.errors import InputError, UsageError, cause_of
+from rollcli.errors import InputError, UsageError, reading
 from rollcli.extras import require_extra
 from rollcli.files.bounded import as_utf8, read_given, read_stream
-from rollcli.files.storage import exists, list_names, read_bytes
+from rollcli.files.storage import list_names, read_bytes
 from rollcli.files.stores.locations import is_url, is_web_url, public_name
+from rollcli.files.stores.objects import NO_OBJECT
 
 MAGIC = b"PAR1"
 _ROWS_AT_ONCE = 1000
@@ -445,13 +447,17 @@ def run_path(path: str | Path) -> str:
 def read_run(path: str | Path) -> Mapping[str, Any] | None:
     """Read the record of the run that wrote the result `path`; None when there is none, as on the web."""
     record = run_path(path)
-    if is_web_url(record) or not exists(record):
+    if is_web_url(record) or not (is_url(record) or os.path.lexists(record)):
         return None
     try:
         data = read_named(record)
         if b"\\u0000" in data:  # no option holds one
             raise ValueError("it holds a NUL character")
         run = json.loads(as_utf8(data, record))
+    except InputError as error:
+        if error.code == NO_OBJECT:
+            return None
+        raise
     except (ValueError, RecursionError) as error:
         raise InputError(f"{record}: is not JSON: {error}") from error
     if not isinstance(run, dict):
@@ -469,10 +475,8 @@ def read_named(path: str | Path) -> bytes:
     """
     if is_url(str(path)):
         return read_bytes(path)
-    try:
+    with reading(path):
         return read_stream(sys.stdin.buffer, STDIN) if str(path) == STDIN else read_given(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {cause_of(error)}") from error
 
 
 # what lies outside is another program's idea of a roll

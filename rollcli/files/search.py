@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rollcli.errors import UsageError
+from rollcli.errors import UsageError, reading
 from rollcli.files.atomic import is_file, is_folder, mode_of
 from rollcli.files.containers import frame_name, is_archive, members, refuse_packed
 from rollcli.files.stores.locations import (
@@ -68,7 +68,7 @@ def objects_behind(url: str, *, recursive: bool) -> Iterator[tuple[str, str]]:
     if glob.has_magic(url):
         base = url[: url.rindex("/", 0, _MAGIC.search(url).start()) + 1]  # type: ignore[union-attr]
         pattern = url.removeprefix(base).split("/")
-    for found, _ in list_objects(base):
+    for found, *_ in list_objects(base):
         relative = found.removeprefix(base)
         fits = _fits(relative.split("/"), pattern) if pattern else recursive or "/" not in relative
         hidden = any(part.startswith(".") for part in relative.split("/"))
@@ -320,11 +320,8 @@ def _matches(pattern: str) -> Iterator[str]:
 
 
 def _entries(folder: str) -> list[os.DirEntry[str]]:
-    try:
-        with os.scandir(folder) as entries:
-            return list(entries)
-    except OSError as error:
-        raise UsageError(f"{folder}: this folder cannot be read: {(error.strerror or '').lower()}") from None
+    with reading(folder, "this folder", UsageError), os.scandir(folder) as entries:
+        return list(entries)
 
 
 def _identity(folder: str | Path) -> tuple[int, int]:

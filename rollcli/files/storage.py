@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rollcli.errors import InputError, OutputError, cause_of
+from rollcli.errors import InputError, OutputError, reading
 from rollcli.files import bounded
 from rollcli.files.atomic import NameTakenError, in_threads, write_atomic, writing
 from rollcli.files.bounded import MOST_BYTES, too_large
@@ -59,7 +59,7 @@ def noting(wanted: bool = True) -> Iterator[dict[str, Note]]:
 def state_of(location: str) -> str:
     """Return size and time of a file, or of the file that a frame lies in; empty where nothing tells them.
 
-    Of an object, `read_frame` notes the entity tag, which listings have too (`objects.list_tags`).
+    Of an object, `read_frame` notes the entity tag, which listings have too (`objects.list_objects`).
     """
     if is_url(location):
         return ""
@@ -196,43 +196,42 @@ def write_bytes(location: str, data: bytes, *, durable: bool = False, owner: str
     objects.write_object(location, data, owner)
 
 
-def write_new(location: str, data: bytes) -> None:
-    """Write a file or an object, whole or not at all; what another program wrote is not replaced.
+def create(location: str, data: bytes, owner: str = "", *, durable: bool = True) -> bool:
+    """Write a file or an object unless there is one of this name; return whether this owner wrote it.
 
-    Nothing is in the way if it holds these very bytes, or, on local disk, as many of them as a power cut left
-    of an earlier write: the first ones, and zeros where the rest should be.
+    A file that holds these very bytes counts as this owner's; and where files need not be durable, one that
+    holds as many of them as a power cut left of an earlier write: the first ones, and zeros where the rest
+    should be.
 
     Parameters
     ----------
     location : str
         A path, or a URL of an object store.
     data : bytes
+    owner : str
+        Names who writes an object, by default whoever writes these bytes. A store may have taken a request
+        whose answer was lost; when the request is repeated, this name tells our own object from another's.
+    durable : bool
+        Whether a file survives a power cut once this returns, as an object always does.
 
     Raises
     ------
     OutputError
-        It cannot be written, or something else has its name.
+        It cannot be written.
     """
     if is_url(location):
         _require_writable(location)
-        if not objects.create_object(location, data, hashlib.sha256(data).hexdigest()):
-            raise _taken(location)
-        return
+        return objects.create_object(location, data, owner or hashlib.sha256(data).hexdigest())
     try:
-        write_atomic(location, data, replaces=False)
+        write_atomic(location, data, durable=durable, replaces=False)
     except NameTakenError:
         there = _beginning_of(location, len(data))
-        if there is None or not data.startswith(there.rstrip(b"\0")):
-            raise _taken(location) from None
-        if there != data:
-            write_atomic(location, data)
-
-
-def _taken(location: str) -> OutputError:
-    return OutputError(
-        f"{public_name(location)}: exists already and is not of this run; move it away, or give --overwrite "
-        "to replace it"
-    )
+        if there == data:  # by a worker that died before it could say so, perhaps
+            return True
+        if durable or there is None or not data.startswith(there.rstrip(b"\0")):
+            return False
+        write_atomic(location, data)
+    return True
 
 
 def _beginning_of(path: str, size: int) -> bytes | None:
@@ -245,57 +244,16 @@ def _beginning_of(path: str, size: int) -> bytes | None:
         return None
 
 
-def create(location: str, data: bytes, owner: str) -> bool:
-    """Write a file or an object unless there is one of this name; return whether this owner wrote it.
-
-    A file that holds these very bytes counts as this owner's.
-
-    Parameters
-    ----------
-    location : str
-        A path, or a URL of an object store.
-    data : bytes
-    owner : str
-        Names who writes. A store may have taken a request whose answer was lost; when the request is
-        repeated, this name tells our own object from another's.
-
-    Raises
-    ------
-    OutputError
-        It cannot be written.
-    """
-    if not is_url(location):
-        try:
-            write_atomic(location, data, durable=True, replaces=False)
-        except NameTakenError:  # by a worker that died before it could say so, perhaps
-            return _beginning_of(location, len(data)) == data
-        return True
-    _require_writable(location)
-    return objects.create_object(location, data, owner)
-
-
 def list_names(folder: str) -> list[str]:
     """Return the names of the files in a folder, or of the objects below a prefix; none if it is absent."""
     if is_url(folder):
         if scheme_of(folder) in WEB_SERVERS:
             return []  # a web server cannot be asked
         base = folder.rstrip("/") + "/"
-        return [url.removeprefix(base) for url, _ in objects.list_objects(base)]
-    try:
+        return [url.removeprefix(base) for url, *_ in objects.list_objects(base)]
+    with reading(folder), contextlib.suppress(FileNotFoundError, NotADirectoryError):
         return [path.name for path in Path(folder).iterdir()]
-    except (FileNotFoundError, NotADirectoryError):
-        return []
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be read: {cause_of(error)}") from error
-
-
-def exists(location: str) -> bool:
-    """Return whether there is a file or an object of this name."""
-    if not is_url(location):
-        return os.path.lexists(location)
-    if scheme_of(location) in WEB_SERVERS:
-        return True  # asking costs as much as reading; reading says what is wrong
-    return objects.object_exists(location)
+    return []
 
 
 def remove(location: str) -> None:

@@ -13,7 +13,7 @@ from rollcli.files.results import Row
 from rollcli.files.stores.locations import tasks_in_hand
 from rollcli.messages import say
 from rollcli.run.find import Named, check_depth, check_first_size, map_frames, pair_frames
-from rollcli.run.frame import Conversion, Frame, FrameResult, failed_frame
+from rollcli.run.frame import Frame, FrameResult, failed_frame
 from rollcli.run.options import (
     ConvertOptions,
     DerotateOptions,
@@ -28,7 +28,7 @@ from rollcli.run.outputs import (
     check_places,
     check_writes,
     list_files,
-    output_path,
+    paths_of,
     write_outputs,
 )
 from rollcli.run.progress import Progress
@@ -47,17 +47,17 @@ def run_conversion(options: ConvertOptions) -> ExitStatus:
         The run cannot start or cannot go on.
     """
     running = options.running
-    conversions = _plan(options)
+    frames = _plan(options)
     if running.dry_run:
-        list_files((each.frame.reads(), each.writes) for each in conversions)
+        list_files((each.reads(), paths_of(each, options)) for each in frames)
         return ExitStatus.DONE
     require_scheduler(running.scheduler)
-    remove_leftovers(path for each in conversions for path in each.writes)
-    progress = Progress(len(conversions), running, options.encoding, statuses=("ok",))
+    remove_leftovers(path for each in frames for path in paths_of(each, options))
+    progress = Progress(len(frames), running, options.encoding, statuses=("ok",))
     with (
         stop_on_signals() as stop,
         progress,
-        contextlib.closing(_results(conversions, options, stop)) as results,
+        contextlib.closing(_results(frames, options, stop)) as results,
     ):
         for result in results:
             progress.add(result)
@@ -68,25 +68,25 @@ def run_conversion(options: ConvertOptions) -> ExitStatus:
     return progress.summary.status
 
 
-def _plan(options: ConvertOptions) -> list[Conversion]:
-    """Find the frames and their rows, and check what would be read and written."""
+def _plan(options: ConvertOptions) -> list[Frame]:
+    """Find the frames, give each its row, and check what would be read and written."""
     _check_options(options)
     frames = _find_frames(options)
     rows = _find_rows(frames, options)
     say(*check_first_size(frames, options.frame))
-    conversions = []
-    for frame, row in zip(frames, rows, strict=True):
-        if row is None or row.status != "suspect" or not options.skip_suspect:
-            writes = [output_path(frame, folder, ending) for folder, ending in options.writes]
-            conversions.append(Conversion(frame, tuple(writes) if frame.relative else (), row))
-    check_one_owner((each.frame, each.writes) for each in conversions)
-    check_places([each.frame for each in conversions], [options.output])
+    wanted = [
+        replace(frame, row=row)
+        for frame, row in zip(frames, rows, strict=True)
+        if row is None or row.status != "suspect" or not options.skip_suspect
+    ]
+    check_one_owner((each, paths_of(each, options)) for each in wanted)
+    check_places(wanted, [options.output])
     check_writes(
-        [path for each in conversions for path in each.frame.reads()],
-        [path for each in conversions for path in each.writes],
+        [path for each in wanted for path in each.reads()],
+        [path for each in wanted for path in paths_of(each, options)],
         overwrite=options.running.overwrite,
     )
-    return conversions
+    return wanted
 
 
 def _check_options(options: ConvertOptions) -> None:
@@ -133,42 +133,40 @@ def _find_rows(frames: Sequence[Frame], options: ConvertOptions) -> Sequence[Row
 
 
 def _results(
-    conversions: Sequence[Conversion], options: ConvertOptions, stop: Stop
+    frames: Sequence[Frame], options: ConvertOptions, stop: Stop
 ) -> Generator[FrameResult, None, None]:
-    """Yield the result of each conversion from whichever workers were asked for."""
+    """Yield the result of each frame from whichever workers were asked for."""
     running, folder = options.running, options.output
-    sample = (*conversions[:1], *conversions[-1:])
-    files = tuple(file_of(path) for each in sample for path in each.frame.reads())
+    sample = (*frames[:1], *frames[-1:])
+    files = tuple(file_of(path) for each in sample for path in each.reads())
     threads = tasks_in_hand((*files, folder))
     workers = Workers(running.jobs, running.scheduler, files, (folder,), threads=threads)
     told = replace(options, inputs=InputOptions())  # which may be long
     work = Work(
         partial(_convert, options=told, read=options.frame),  # made here, where relative paths start
-        partial(_lost, replaces=running.overwrite),
-        lambda each: remove_leftovers(each.writes),
-        prepare=partial(_decode, read=options.frame)
-        if any(each.frame.of_videos for each in conversions)
-        else None,
+        partial(_lost, options=told),
+        lambda each: remove_leftovers(paths_of(each, told)),
+        prepare=partial(_decode, read=options.frame) if any(each.of_videos for each in frames) else None,
     )
     try:
-        yield from run_tasks(conversions, work, stop, workers)
+        yield from run_tasks(frames, work, stop, workers)
     finally:
         if workers.scheduler is not None:  # a worker that died elsewhere cannot be waited for
-            remove_leftovers(path for each in conversions for path in each.writes)
+            remove_leftovers(path for each in frames for path in paths_of(each, options))
 
 
-def _convert(conversion: Conversion, options: ConvertOptions, read: FrameOptions) -> FrameResult:
+def _convert(frame: Frame, options: ConvertOptions, read: FrameOptions) -> FrameResult:
     from rollcli.run.images import convert_frame  # loads NumPy: only on a worker
 
-    return convert_frame(conversion, options, read)
+    return convert_frame(frame, options, read)
 
 
-def _decode(conversion: Conversion, read: FrameOptions) -> Conversion:
+def _decode(frame: Frame, read: FrameOptions) -> Frame:
     from rollcli.run.read import decoded
 
-    return conversion._replace(frame=decoded(conversion.frame, read))
+    return decoded(frame, read)
 
 
-def _lost(conversion: Conversion, reason: str, replaces: bool) -> FrameResult:
-    write_outputs({}, conversion.writes, replaces=replaces)
-    return failed_frame(conversion.frame, reason)
+def _lost(frame: Frame, reason: str, options: ConvertOptions) -> FrameResult:
+    write_outputs({}, paths_of(frame, options), replaces=options.running.overwrite)
+    return failed_frame(frame, reason)

@@ -11,7 +11,8 @@ from rollcli.errors import InputError, UsageError
 from rollcli.extras import require_extra
 from rollcli.files.atomic import is_file
 from rollcli.files.containers import BAGS, VIDEOS, bag_files, file_of, frame_name, is_video
-from rollcli.files.inputs import Input, Manifest, Pair, find_inputs, named_input, pair_inputs
+from rollcli.files.inputs import Manifest, find_inputs, named_input, pair_inputs
+from rollcli.files.naming import Input
 from rollcli.files.search import IMAGE_ENDINGS, MAP_ENDINGS, Search, is_place, objects_behind
 from rollcli.files.storage import fetch_all, read_bytes
 from rollcli.files.stores.locations import is_url, names_a_file, public_name
@@ -30,7 +31,7 @@ from rollcli.run.options import (
 )
 
 if TYPE_CHECKING:
-    from rollcli.files.recordings.frames import BagFrames, RecordingFrame
+    from rollcli.files.recordings.frames import BagFrames
 
 
 _MARK = "_camera"  # Cityscapes: aachen_000000_000019_camera.json
@@ -335,7 +336,7 @@ def pair_frames(named: Named) -> list[Frame]:
             raise UsageError("--left and --right are given together")
         else:
             matched = pair_inputs(pairs.left, pairs.right, search, match=pairs.match)
-            both = [views for pair in matched for views in _paired(pair)]
+            both = [views for pair in matched for views in _paired(*pair)]
     return [make.frame(left, right) for left, right in both[:: given.every]]
 
 
@@ -346,24 +347,18 @@ def _halved(each: Input, layout: Layout) -> list[tuple[Input, Input]]:
     _require_local(each.location)
     from rollcli.files.recordings.video import frames_of_video
 
-    found = frames_of_video(each.location, each.name, each.relative, layout)
-    return [(view, view) for view in map(_recorded, found)]
+    return [(view, view) for view in frames_of_video(each, layout)]
 
 
-def _paired(pair: Pair) -> list[tuple[Input, Input]]:
+def _paired(left: Input, right: Input) -> list[tuple[Input, Input]]:
     """Pair the frames of two videos; images are a pair themselves."""
-    if not any(is_video(each.location) for each in pair):
-        return [pair]
-    for each in pair:
+    if not (is_video(left.location) or is_video(right.location)):
+        return [(left, right)]
+    for each in (left, right):
         _require_local(each.location)
     from rollcli.files.recordings.video import frames_of_pair
 
-    found = frames_of_pair(*((each.location, each.name, each.relative) for each in pair))
-    return [(_recorded(one), _recorded(other)) for one, other in found]
-
-
-def _recorded(frame: "RecordingFrame") -> Input:
-    return Input(frame.location, frame.name.replace(os.sep, "/"), frame.relative)
+    return frames_of_pair(left, right)
 
 
 def _require_local(location: str) -> None:
@@ -415,7 +410,7 @@ def _bag_frames(bags: "Iterable[BagFrames]", make: "_FrameMaker") -> list[Frame]
         if not make.quiet:
             say(*dict.fromkeys(bag.notes))
         for left, right in bag.frames:
-            frame = make.frame(_recorded(left), right and _recorded(right))
+            frame = make.frame(left, right)
             own = make.calibrations.given
             frames.append(frame if own else replace(frame, calibration=bag.calibration))
     return frames

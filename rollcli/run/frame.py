@@ -31,6 +31,8 @@ class Frame:
         The mask file of this frame.
     calibration : Calibration or None
         Of the images as they are in the files; None: without pitch and height.
+    row : Row or None
+        Its own in the result that a conversion is given.
     decoded : Decoded or None
         Its views, where they were read before it was handed out.
     """
@@ -42,6 +44,7 @@ class Frame:
     relative: str
     mask: str | None
     calibration: Calibration | None = None
+    row: Row | None = None
     decoded: "Decoded | None" = field(default=None, compare=False)
 
     def reads(self) -> Iterator[str]:
@@ -67,24 +70,6 @@ class Decoded(NamedTuple):
 
     views: "tuple[NDArray[Any], NDArray[Any]]"
     notes: Mapping[str, Note]
-
-
-class Conversion(NamedTuple):
-    """The task of converting one frame.
-
-    Attributes
-    ----------
-    frame : Frame
-        What is read.
-    writes : tuple of str
-        The files that may be written.
-    row : Row or None
-        Of the frame in the result that is given.
-    """
-
-    frame: Frame
-    writes: tuple[str, ...]
-    row: Row | None = None
 
 
 class ReadAs(NamedTuple):

@@ -23,7 +23,7 @@ from rollcli.pictures.vdisparity import draw_v_disparity, middle_row, profile, r
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import horizon_row
 from rollcli.run.diagnosis import looks_like
-from rollcli.run.frame import Conversion, Frame, FrameResult
+from rollcli.run.frame import Frame, FrameResult
 from rollcli.run.options import (
     ConvertOptions,
     DerotateOptions,
@@ -33,7 +33,7 @@ from rollcli.run.options import (
     HeightsOptions,
     VDisparityOptions,
 )
-from rollcli.run.outputs import image_paths, roomy_path, write_outputs
+from rollcli.run.outputs import image_paths, paths_of, roomy_path, write_outputs
 from rollcli.run.read import Source, guarded, read_source
 
 TOO_LARGE_FOR_PNG = f"written as TIFF: a disparity is above the {KITTI_TOP:.0f} px of a KITTI PNG"
@@ -132,7 +132,7 @@ def _v_disparity(path: str, of: Pictured) -> _Named:
 
 
 def _disparity(path: str, of: Pictured) -> _Named:
-    return encode_computed(path, of.source.shown, of.options.images.save_as, of.source.provenance.text)
+    return encode_computed(path, of.source.shown, of.options.images.save_as, of.source.text)
 
 
 def _road_mask(path: str, of: Pictured) -> _Named:
@@ -165,16 +165,16 @@ _ENCODERS = {
 _Made = tuple[dict[str, bytes], dict[str, str]]  # files by their paths, and warnings by their codes
 
 
-def convert_frame(conversion: Conversion, options: ConvertOptions, read: FrameOptions) -> FrameResult:
+def convert_frame(frame: Frame, options: ConvertOptions, read: FrameOptions) -> FrameResult:
     """Read a frame and write the files that its command makes of it, each whole or not at all."""
-    frame, paths = conversion.frame, [read.at(path) for path in conversion.writes]
+    paths = [read.at(path) for path in paths_of(frame, options)]
     files: dict[str, bytes] = {}
 
     def work() -> FrameResult:
-        if conversion.row is not None and conversion.row.map_roll_deg is None:
+        if frame.row is not None and frame.row.map_roll_deg is None:
             raise InputError(f"{frame.file}: has no angle in {options.result}")
         source = read_source(frame, read)
-        made, warnings = _MAKERS[type(options)](source, conversion, options, paths)
+        made, warnings = _MAKERS[type(options)](source, frame, options, paths)
         files.update(made)
         row = Row(frame.file, frame.right_file, "ok", **source.alignment)
         return FrameResult(row, source.encoding, {**source.doubts, **warnings}, source.searched)
@@ -184,7 +184,7 @@ def convert_frame(conversion: Conversion, options: ConvertOptions, read: FrameOp
     return result
 
 
-def _rotated(source: Source, of: Conversion, options: DerotateOptions, paths: Sequence[str]) -> _Made:
+def _rotated(source: Source, of: Frame, options: DerotateOptions, paths: Sequence[str]) -> _Made:
     """Turn the map, and say where pixels go."""
     assert source.stored is not None  # a map, not a pair
     roll = math.radians((options.roll_deg if of.row is None else of.row.map_roll_deg) or 0.0)
@@ -206,7 +206,7 @@ def _matrix_text(shape: tuple[int, ...], roll: float, expand: bool) -> bytes:
     return "\n".join([*lines, ""]).encode()
 
 
-def _counted(source: Source, of: Conversion, options: VDisparityOptions, paths: Sequence[str]) -> _Made:
+def _counted(source: Source, of: Frame, options: VDisparityOptions, paths: Sequence[str]) -> _Made:
     """Draw the v-disparity image of the map, and count for it; or draw the figure of both."""
     counting: dict[str, Any] = {"bins": options.bins, "max_disparity": options.max_disparity}
     if options.figure is not None:
@@ -223,7 +223,7 @@ def _counted(source: Source, of: Conversion, options: VDisparityOptions, paths: 
         likeness = looks_like(source.disparity, source.stored, options.frame)
     else:
         curve = profile(estimate.alpha, estimate.theta, estimate.width)
-        horizon = _horizon(estimate, of.frame.calibration)
+        horizon = _horizon(estimate, of.calibration)
     files = [encode_png(draw_v_disparity(histogram, curve, horizon=horizon))]
     if options.counts:
         files.append(encode_stored(histogram.counts, "tiff"))
@@ -247,11 +247,11 @@ def _horizon(estimate: RollEstimate, calibration: Calibration | None) -> float |
     return None if y is None else middle_row(y, estimate.theta, estimate.width)
 
 
-def _heights_of_row(source: Source, of: Conversion, options: HeightsOptions, paths: Sequence[str]) -> _Made:
+def _heights_of_row(source: Source, frame: Frame, options: HeightsOptions, paths: Sequence[str]) -> _Made:
     """Measure the heights of the map over the road of its row, and draw them if that was requested."""
-    frame, (height, width) = of.frame, source.disparity.shape
+    height, width = source.disparity.shape
     calibration = None if frame.calibration is None else frame.calibration.for_size(width, height)
-    road = None if of.row is None else FittedRoad.of_row(of.row, calibration)
+    road = None if frame.row is None else FittedRoad.of_row(frame.row, calibration)
     if road is None:
         raise InputError(f"{frame.file}: its row in {options.result} has no road (alpha0, alpha1, alpha2)")
     if (road.width, road.height) != (width, height):
@@ -266,11 +266,11 @@ def _heights_of_row(source: Source, of: Conversion, options: HeightsOptions, pat
     return dict(zip(paths, files, strict=True)), dict(source.warnings)
 
 
-def _matched(source: Source, of: Conversion, options: DisparityOptions, paths: Sequence[str]) -> _Made:
+def _matched(source: Source, of: Frame, options: DisparityOptions, paths: Sequence[str]) -> _Made:
     """Encode the disparity map of the pair, and draw it if that was requested."""
     if not np.any(source.disparity):
-        raise InputError(f"{of.frame.file}: no pixel could be matched with the right image")
-    path, data = encode_computed(paths[0], source.shown, options.save_as, source.provenance.text)
+        raise InputError(f"{of.file}: no pixel could be matched with the right image")
+    path, data = encode_computed(paths[0], source.shown, options.save_as, source.text)
     files = {path: data}
     if options.preview is not None:
         files[paths[-1]] = encode_png(draw_preview(source.shown))

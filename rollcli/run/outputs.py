@@ -16,12 +16,12 @@ from rollcli.files import storage
 from rollcli.files.atomic import is_folder, mark_path, remove_leftovers
 from rollcli.files.containers import file_of, shown
 from rollcli.files.results import STATUSES
-from rollcli.files.storage import read_bytes, remove, remove_all, write_bytes, write_new
+from rollcli.files.storage import create, read_bytes, remove, remove_all, write_bytes
 from rollcli.files.stores.locations import is_object_url, is_url, located, public_name, split_url
 from rollcli.files.stores.objects import list_objects
 from rollcli.files.stream import STDOUT, open_stream
 from rollcli.run.frame import Frame
-from rollcli.run.options import ENDING_OF_FORMAT, ImageKind, ImageOptions, RunningOptions
+from rollcli.run.options import ENDING_OF_FORMAT, ConvertOptions, ImageKind, ImageOptions, RunningOptions
 
 
 def image_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[ImageKind, str]]:
@@ -59,6 +59,11 @@ def output_path(frame: Frame, folder: str, ending: str | None = None) -> str:
     return f"{folder}{name}" if folder.endswith("/") else f"{folder}/{name}"
 
 
+def paths_of(frame: Frame, options: ConvertOptions) -> list[str]:
+    """List the files that a conversion may write for a frame; none of one whose URL names no file."""
+    return [output_path(frame, *each) for each in options.writes] if frame.relative else []
+
+
 def every_path(frame: Frame, images: ImageOptions, root: str = "") -> list[str]:
     """List every image that may be written for a frame, from a folder where relative paths start."""
     return [located(root, path) for paths in possible_paths(frame, images) for path in paths]
@@ -90,7 +95,7 @@ def write_outputs(
     if retry_of and not replaces:
         _write_marked(files, paths, retry_of)
         return
-    write = write_bytes if replaces else write_new
+    write = write_bytes if replaces else _write_new
     for path, data in files.items():
         write(path, data)
     if replaces:
@@ -98,6 +103,14 @@ def write_outputs(
             if path not in files:
                 with contextlib.suppress(OutputError):  # the row says what is wrong with the frame
                     remove(path)
+
+
+def _write_new(path: str, data: bytes) -> None:
+    if not create(path, data, durable=False):
+        raise OutputError(
+            f"{public_name(path)}: exists already and is not of this run; move it away, or give --overwrite "
+            "to replace it"
+        )
 
 
 def _write_marked(files: Mapping[str, bytes], paths: Collection[str], result: str) -> None:
@@ -108,7 +121,7 @@ def _write_marked(files: Mapping[str, bytes], paths: Collection[str], result: st
     for path, data in files.items():
         write_bytes(mark_path(path), _mark(data, result))
         try:
-            write_new(path, data)
+            _write_new(path, data)
         except OutputError:
             remove(mark_path(path))
             raise
@@ -264,7 +277,7 @@ class Existing:
         folder = next((each for each in self._listed if path.startswith(each)), None)
         if folder is None:
             folder = path[: path.rindex("/") + 1] if path.count("/") > root.count("/") + 1 else f"{root}/"
-            self._listed[folder] = {found for found, size in list_objects(folder) if size or not self._filled}
+            self._listed[folder] = {url for url, size, _ in list_objects(folder) if size or not self._filled}
         return path in self._listed[folder]
 
 

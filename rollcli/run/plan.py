@@ -62,8 +62,7 @@ def make_plan(options: EstimateOptions) -> Plan:
         No input; pairs, masks or calibrations without partner; a calibration that is not for the images; two
         frames with the same image; an image or a result that would replace an input, or that exists already.
     """
-    if options.result.retry_failed and not options.result.resume:
-        raise UsageError("--retry-failed does again what failed in an earlier run: give --resume with it")
+    _check_start(options)
     frames = _find_frames(options)
     if not options.paired:
         check_depth(frames, options.encoding)
@@ -90,6 +89,18 @@ def make_plan(options: EstimateOptions) -> Plan:
         raise UsageError("Parquet is a folder of parts: name it with --output")
     further = further_columns(frames, options.result)
     return replace(plan, frames=frames, further=further, notes=tuple(notes))
+
+
+def _check_start(options: EstimateOptions) -> None:
+    """Refuse to continue a result and to begin it anew at once, or to continue what is no file."""
+    asked = options.result
+    flag = "--update" if asked.update else "--resume"
+    if asked.retry_failed and not asked.resume:
+        raise UsageError("--retry-failed does again what failed in an earlier run: give --resume with it")
+    if asked.resume and options.running.overwrite:
+        raise UsageError(f"give either {flag} or --overwrite")
+    if asked.resume and is_stream(asked.output):
+        raise UsageError(f"{flag} needs a result file: name it with --output")
 
 
 def further_columns(frames: Sequence[Frame], options: ResultOptions) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ import contextlib
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
@@ -29,45 +29,6 @@ from rollcli.stereo.options import StereoOptions
 
 if TYPE_CHECKING:
     from rollcli.stereo.match import StereoMatch, Wanted
-
-
-@dataclass(frozen=True)
-class Provenance:
-    """How far a map from a pair may be believed.
-
-    Attributes
-    ----------
-    slope_error : float
-        Standard deviation of a slope that all disparities may have beside the road's, px per px.
-    doubt : str
-        Why the map itself may be wrong; empty when there is no reason.
-    alignment : mapping of str to float
-        How the right view lay, by column of a result; empty where that could not be told.
-    """
-
-    slope_error: float = 0.0
-    doubt: str = ""
-    alignment: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def text(self) -> str:
-        """One line of ASCII for a file; empty where there is nothing to carry."""
-        return "" if self == Provenance() else json.dumps(asdict(self))
-
-    @staticmethod
-    def of_text(text: str) -> "Provenance":
-        """Read such a line; nothing is known where another program has written or changed it."""
-        try:
-            carried = json.loads(text)
-            error, doubt, lay = float(carried["slope_error"]), carried["doubt"], carried["alignment"]
-            alignment = {name: float(lay[name]) for name in ALIGNMENT_COLUMNS if name in lay}
-        except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
-            return Provenance()
-        if not (
-            0 <= error < math.inf and isinstance(doubt, str) and all(map(math.isfinite, alignment.values()))
-        ):
-            return Provenance()
-        return Provenance(error, one_line(doubt), alignment)
 
 
 Corner = tuple[float, float]
@@ -194,9 +155,11 @@ class Source:
         return "; ".join(filter(None, self.doubts.values()))
 
     @property
-    def provenance(self) -> Provenance:
-        """What a file of the map carries."""
-        return Provenance(self.slope_error, self.doubt, self.alignment)
+    def text(self) -> str:
+        """What a file of the map carries, one line of ASCII (see `_carried`); empty where that is nothing."""
+        if not (self.slope_error or self.doubt or self.alignment):
+            return ""
+        return json.dumps({"slope_error": self.slope_error, "doubt": self.doubt, "alignment": self.alignment})
 
     @property
     def shown(self) -> NDArray[Any]:
@@ -232,18 +195,34 @@ def _read(frame: Frame, options: FrameOptions) -> Source:
     found = to_disparity(stored, **given._asdict(), calibration=frame.calibration)
     encoding = found.encoding.value
     beyond = {"beyond": too_large(found.disparity, stored, encoding)}
-    carried = Provenance.of_text(stored.text)
+    error, doubt, alignment = _carried(stored.text)
     # the roll is the same at any scale, pitch and height are not
-    doubts = {"carried": carried.doubt, **(beyond if frame.calibration is not None else {})}
+    doubts = {"carried": doubt, **(beyond if frame.calibration is not None else {})}
     return Source(
         found.disparity,
         stored=stored,
         encoding=encoding,
         warnings={**found.warnings, **beyond},
-        slope_error=carried.slope_error,
+        slope_error=error,
         doubts=doubts,
-        alignment=carried.alignment,
+        alignment=alignment,
     )
+
+
+def _carried(text: str) -> tuple[float, str, Mapping[str, float]]:
+    """Read from a map's file how far the map may be believed: slope error, doubt and alignment of a `Source`.
+
+    Nothing is known where another program has written or changed it.
+    """
+    try:
+        carried = json.loads(text)
+        error, doubt, lay = float(carried["slope_error"]), carried["doubt"], carried["alignment"]
+        alignment = {name: float(lay[name]) for name in ALIGNMENT_COLUMNS if name in lay}
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
+        return 0.0, "", {}
+    if not (0 <= error < math.inf and isinstance(doubt, str) and all(map(math.isfinite, alignment.values()))):
+        return 0.0, "", {}
+    return error, one_line(doubt), alignment
 
 
 def _match(frame: Frame, options: FrameOptions) -> Source:

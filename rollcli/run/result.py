@@ -245,18 +245,11 @@ def _begin(file: ResultFile, inputs: ResultFile, plan: Plan) -> FileOutput:
 
 def _check_permitted(plan: Plan) -> None:
     """Refuse to touch a result that exists, unless --resume or --overwrite is given."""
-    name, asked, overwrite = plan.output, plan.options.result, plan.options.running.overwrite
-    resume, flag = asked.resume, "--update" if asked.update else "--resume"
-    if resume and overwrite:
-        raise UsageError(f"give either {flag} or --overwrite")
-    if is_stream(name):
-        if resume:
-            raise UsageError(f"{flag} needs a result file: name it with --output")
-        return
-    if overwrite:
+    name = plan.output
+    if is_stream(name) or plan.options.running.overwrite:
         return
     if has_rows(name):
-        if not resume:
+        if not plan.options.result.resume:
             raise UsageError(
                 f"{name}: exists already; give --resume to continue it or --overwrite to replace it"
             )

@@ -26,7 +26,7 @@ from rollcli.files.locking import locked, take_lock
 from rollcli.files.results import FURTHER, Format, format_header, part_name
 from rollcli.files.storage import Note, noting, read_frame, state_of
 from rollcli.files.stores.locations import is_object_url, is_url
-from rollcli.files.stores.objects import list_tags
+from rollcli.files.stores.objects import list_objects
 from rollcli.run.frame import Frame
 
 _HEADERS = tuple(
@@ -513,7 +513,7 @@ class Inputs:
         folder = path[: path.rindex("/") + 1]
         if folder not in self._tags:
             try:
-                self._tags = {folder: dict(list_tags(folder))}
+                self._tags = {folder: {url: tag for url, _, tag in list_objects(folder)}}
             except RollcliError:  # it may not be listed: then its objects are read
                 self._tags = {folder: {}}
         return self._tags[folder].get(path, "")

@@ -6,7 +6,7 @@ from dataclasses import astuple
 from functools import lru_cache
 from pathlib import Path
 
-from rollcli.errors import UsageError
+from rollcli.errors import UsageError, reading
 from rollcli.stereo.misalignment import ColumnSupport, Misalignment
 
 _VALUES = ("right_lower_px", "right_clockwise_deg", "right_larger_percent", "right_twist_px")
@@ -33,15 +33,12 @@ def read_correction(path: str) -> tuple[Misalignment, ColumnSupport | None, int]
         The file cannot be read, or is no correction.
     """
     try:
-        found = json.loads(Path(path).read_bytes())
+        with reading(f"--align {path}", kind=UsageError):
+            found = json.loads(Path(path).read_bytes())
         values = [float(found[name]) for name in _VALUES]
         width, height = int(found["width"]), int(found["height"])
         told = found.get("columns")
         columns = ColumnSupport(*(float(told[name]) for name in _COLUMNS)) if told is not None else None
-    except OSError as error:
-        raise UsageError(
-            f"--align {path}: cannot be read: {(error.strerror or str(error)).lower()}"
-        ) from error
     except (ValueError, KeyError, TypeError, RecursionError, OverflowError) as error:
         raise UsageError(f"--align {path}: is no correction that `rollcli rig --correction` wrote") from error
     fits = all(math.isfinite(each) and abs(each) <= most for each, most in zip(values, _LARGEST, strict=True))

@@ -43,10 +43,10 @@ def matched_pairs() -> dict[str, np.ndarray]:
     """Disparity maps by the name of their left image, px; 0 is no data."""
     maps = {}
     for name, downscale in (("streets", 1.0), ("roads", 2.0)):
-        for pair in pair_inputs(str(SHARED / name / "left"), str(SHARED / name / "right")):
-            views = read_image(pair.left.path), read_image(pair.right.path)
+        for left, right in pair_inputs(str(SHARED / name / "left"), str(SHARED / name / "right")):
+            views = read_image(left.path), read_image(right.path)
             match = match_pair(*views, StereoOptions(downscale=downscale))
-            maps[Path(pair.left.name).stem] = match.disparity
+            maps[Path(left.name).stem] = match.disparity
     return maps
 
 

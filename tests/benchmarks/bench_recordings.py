@@ -25,6 +25,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 from rollcli.files.formats import read_image, read_stored
+from rollcli.files.naming import Input
 from rollcli.files.recordings import frames as of_bags
 from rollcli.files.recordings import video
 from rollcli.simulate.build import render_frame
@@ -100,7 +101,7 @@ def frames_of_video(path: Path) -> int:
     """Count the frames of a video, and read each."""
     for cached in (video._look_through, video._decoder):
         cached.cache_clear()
-    found = video.frames_of_video(str(path), str(path), path.name, "left-right")
+    found = video.frames_of_video(Input(str(path), str(path), path.name), "left-right")
     return sum(1 for each in found if read_image(each.location, each.name).size)
 
 

@@ -70,7 +70,7 @@ def below(bucket):
     from rollcli.files.storage import read_bytes
     from rollcli.files.stores.objects import list_objects
 
-    urls = [url for url, _ in list_objects(f"{bucket}/")]
+    urls = [url for url, *_ in list_objects(f"{bucket}/")]
     names = [re.sub(r"/part-00000\.\w+$", "", url.removeprefix(f"{bucket}/")) for url in urls]
     return {name: partial(read_bytes, url) for name, url in zip(names, urls, strict=True)}
 

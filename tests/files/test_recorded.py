@@ -129,7 +129,7 @@ def _paired(files, words):
     with _folder_of(files):
         match = options.pop("match", "name")
         found = _answer(lambda: pair_inputs(*sides, Search(IMAGE_ENDINGS, **options), match=match))
-    return found if isinstance(found, str) else [[each.left.name, each.right.name] for each in found]
+    return found if isinstance(found, str) else [[left.name, right.name] for left, right in found]
 
 
 def _columns(data):

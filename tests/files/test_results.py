@@ -17,6 +17,7 @@ from rollcli.files.results import (
     plain_values,
     read_result,
 )
+from rollcli.files.storage import write_bytes
 
 ROW = Row(
     file="maps/a.png",
@@ -54,6 +55,11 @@ HOSTILE = {
     "such a number in CSV": b"file,status,roll_deg,iterations\na,ok,1," + b"1" * 5000 + b"\n",
     "a long status": b"file,status,roll_deg\na," + b"x" * 5000 + b",1\n",
 }
+
+
+def test_a_result_in_a_bucket_is_read_without_the_record_of_its_run(bucket):
+    write_bytes(f"{bucket}/rolls.csv", b"file,status,roll_deg\na.png,ok,1\n")
+    assert read_result(f"{bucket}/rolls.csv").run is None
 
 
 @pytest.mark.parametrize("what", HOSTILE)

@@ -3,11 +3,12 @@
 import math
 
 import cv2
+import numpy as np
 import pytest
 
 import rollcli as package
 from rollcli.files.results import ALIGNMENT_COLUMNS
-from rollcli.run.read import Provenance
+from rollcli.run.read import Source, _carried
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
 from tests.run_cli import rollcli, rows_of
@@ -78,10 +79,11 @@ def test_the_call_says_what_the_command_does(pair):
 
 
 def test_what_a_file_carries_is_read_back_and_what_others_wrote_is_not():
-    carried = Provenance(0.00125, 'a "doubt"', {"right_lower_px": 1.25})
-    assert Provenance.of_text(carried.text) == carried
-    assert Provenance().text == ""
-    assert carried.text.isascii()
+    known = {"slope_error": 0.00125, "doubts": {"match": 'a "doubt"'}, "alignment": {"right_lower_px": 1.25}}
+    text = Source(np.zeros((1, 1)), **known).text
+    assert _carried(text) == (0.00125, 'a "doubt"', {"right_lower_px": 1.25})
+    assert Source(np.zeros((1, 1))).text == ""
+    assert text.isascii()
     lies = '{"slope_error": 0, "doubt": "", "alignment": {"right_lower_px": NaN, "right_twist_px": 1}}'
     for other in ("", "{}", "[1]", "null", '{"slope_error": -1, "doubt": "", "alignment": {}}', "no", lies):
-        assert Provenance.of_text(other) == Provenance()
+        assert _carried(other) == (0.0, "", {})

@@ -290,8 +290,8 @@ def test_an_offset_that_cannot_be_is_refused(offset):
 def test_real_street_pairs_are_levelled_by_what_was_added(clockwise_deg, larger_percent, lower):
     odd = {"clockwise_deg": clockwise_deg, "larger_percent": larger_percent, "lower": lower}
     compared = 0
-    for pair in pair_inputs(str(SHARED / "streets" / "left"), str(SHARED / "streets" / "right"))[::6]:
-        left, right = read_image(pair.left.path), read_image(pair.right.path)
+    for views in pair_inputs(str(SHARED / "streets" / "left"), str(SHARED / "streets" / "right"))[::6]:
+        left, right = (read_image(view.path) for view in views)
         as_it_is = match_pair(left, right, StereoOptions())
         match = match_pair(left, seen_by(right, **odd), StereoOptions())
 

@@ -206,26 +206,22 @@ def test_options_that_make_no_sense_are_refused(options):
 
 @pytest.mark.skipif(not (SHARED / "roads").is_dir(), reason="no real road pairs at ../shared/roads")
 def test_real_road_pairs_need_and_get_a_wide_range():
-    for pair in pair_inputs(str(SHARED / "roads" / "left"), str(SHARED / "roads" / "right")):
-        match = match_pair(
-            read_image(pair.left.path), read_image(pair.right.path), StereoOptions(downscale=4)
-        )
+    for left, right in pair_inputs(str(SHARED / "roads" / "left"), str(SHARED / "roads" / "right")):
+        match = match_pair(read_image(left.path), read_image(right.path), StereoOptions(downscale=4))
         inside = match.disparity[:, match.num_disparities :]
 
         assert 4 * match.num_disparities > 331
         assert match.end_fraction < 0.001
         assert (inside > 0).mean() > 0.9
         roll_deg = math.degrees(estimate_roll(match.disparity, Request(road="all")).theta)
-        assert roll_deg == pytest.approx(ROADS[pair.left.path.stem], abs=0.15)
+        assert roll_deg == pytest.approx(ROADS[left.path.stem], abs=0.15)
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not (SHARED / "streets").is_dir(), reason="no real street pairs at ../shared/streets")
 def test_real_street_pairs_get_a_range_that_fits():
-    for pair in pair_inputs(str(SHARED / "streets" / "left"), str(SHARED / "streets" / "right")):
-        match = match_pair(
-            read_image(pair.left.path), read_image(pair.right.path), StereoOptions(downscale=2)
-        )
+    for left, right in pair_inputs(str(SHARED / "streets" / "left"), str(SHARED / "streets" / "right")):
+        match = match_pair(read_image(left.path), read_image(right.path), StereoOptions(downscale=2))
 
         assert 32 <= match.num_disparities <= 112
         assert match.end_fraction < 0.03

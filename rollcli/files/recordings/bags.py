@@ -19,7 +19,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
-from rollcli.errors import InputError, cause_of
+from rollcli.errors import InputError, reading
 from rollcli.files.bounded import MOST_BYTES, most_unpacked
 
 _BEGINNING = 64  # bytes: a header's time and more
@@ -460,7 +460,7 @@ def open_bag(path: str) -> Bag:
     InputError
         It is none, or cannot be read.
     """
-    try:
+    with reading(path):
         with Path(path).open("rb") as file:
             head = file.read(16)
         if head.startswith(_MCAP):
@@ -469,8 +469,6 @@ def open_bag(path: str) -> Bag:
             return _Ros1(path)
         if head == _SQLITE:
             return _Sqlite(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {cause_of(error)}") from None
     what = "is empty" if not head else "is no ROS 1 bag, MCAP file or sqlite3 bag"
     raise InputError(f"{path}: {what}")
 

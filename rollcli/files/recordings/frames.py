@@ -4,15 +4,15 @@ import contextlib
 import os
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError, as_usage
 from rollcli.files.bounded import state_of
-from rollcli.files.naming import listed
+from rollcli.files.naming import Input, listed
 from rollcli.files.recordings import messages
 from rollcli.files.recordings.bags import Bag, Message, Topic, opened
 from rollcli.files.recordings.messages import CAMERA_INFO, COMPRESSED, DISPARITY, IMAGE, CameraInfo
@@ -23,22 +23,13 @@ _RAW = "image_raw"
 _NO_P = "no CameraInfo with a principal point (P): no pitch and no height without --calib"
 
 
-class RecordingFrame(NamedTuple):
-    """Where a frame is, as rows name it, the file name of what is made of it, and its stamp, ns."""
-
-    location: str
-    name: str
-    relative: str
-    stamp: int
-
-
 @dataclass
 class BagFrames:
     """What a bag, of one file or several, has for a run.
 
     Attributes
     ----------
-    frames : list of (RecordingFrame, RecordingFrame or None)
+    frames : list of (Input, Input or None)
         Maps, or left and right views.
     calibration : Calibration or None
         Of the rectified pair, by CameraInfo.
@@ -46,7 +37,7 @@ class BagFrames:
         What the user should know, a line each.
     """
 
-    frames: list[tuple[RecordingFrame, RecordingFrame | None]] = field(default_factory=list)
+    frames: list[tuple[Input, Input | None]] = field(default_factory=list)
     calibration: Calibration | None = None
     notes: list[str] = field(default_factory=list)
 
@@ -55,7 +46,7 @@ class BagFrames:
 class _Found:
     """The frames of some topics, the CameraInfo of cameras and their places, and what is broken."""
 
-    frames: dict[str, list[RecordingFrame]]
+    frames: dict[str, list[Input]]
     cameras: dict[str, CameraInfo]
     places: dict[tuple[str, str], str]
     broken: list[tuple[str, str]]
@@ -281,7 +272,7 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
     """Read through the files once: the stamps of the wanted topics, and a CameraInfo of each camera."""
     by_name = {each.name: each for each in wanted}
     infos = {each.name for each in _decodable(topics, CAMERA_INFO)}
-    frames: dict[str, list[RecordingFrame]] = {each: [] for each in by_name}
+    frames: dict[str, list[Input]] = {each: [] for each in by_name}
     cameras: dict[str, CameraInfo] = {}
     places: dict[tuple[str, str], str] = {}
     broken = []
@@ -304,9 +295,8 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
             again = f".{seen[name]}" if seen[name] else ""  # a recorder may write a message twice
             ending = ".png" if topic.type == COMPRESSED else ".npy"
             relative = f"{stem}_{stamp}{again.replace('.', '_')}{ending}"
-            frames[topic.name].append(
-                RecordingFrame(f"{name}{again}#@{place}", f"{name}{again}", relative, stamp)
-            )
+            shown = f"{name}{again}".replace(os.sep, "/")
+            frames[topic.name].append(Input(f"{name}{again}#@{place}", shown, relative, stamp))
         if bag.broken:
             broken.append((path, stem))
     return _Found(frames, cameras, places, broken)
@@ -317,7 +307,7 @@ def _finish(bag: BagFrames, found: _Found, name: str, topic: str) -> None:
     if not bag.frames and not found.broken:
         raise UsageError(f"{name}: has no messages of {topic}")
     for path, stem in found.broken:
-        rest = RecordingFrame(f"{path}#rest", f"{path}#rest", f"{stem}_rest.npy", 0)
+        rest = Input(f"{path}#rest", f"{path}#rest".replace(os.sep, "/"), f"{stem}_rest.npy")
         bag.frames.append((rest, None if not bag.frames or bag.frames[0][1] is None else rest))
 
 
@@ -352,10 +342,10 @@ def _calibration(
     return Calibration(p[0], p[5], p[2], p[6], baseline or None, doffs, *size, source=source)
 
 
-def _rectified(found: _Found, topic: str, frame: RecordingFrame) -> RecordingFrame:
+def _rectified(found: _Found, topic: str, frame: Input) -> Input:
     """Add to a frame's location where its CameraInfo is; a file of a split bag without one stays as it is."""
     place = found.places.get((frame.location.partition("#")[0], _beside(topic)))
-    return frame if place is None else frame._replace(location=f"{frame.location}+{place}")
+    return frame if place is None else replace(frame, location=f"{frame.location}+{place}")
 
 
 def _place(location: str) -> tuple[int, ...]:

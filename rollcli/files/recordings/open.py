@@ -13,6 +13,7 @@ from rollcli.files.codecs.pictures import views_of
 from rollcli.files.containers import bag_files, is_video
 from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import read_image, read_stored
+from rollcli.files.naming import Input
 from rollcli.files.recordings.frames import maps_of_bag, pairs_of_bag
 from rollcli.files.recordings.video import frames_of_pair, frames_of_video
 from rollcli.rig.calibration import Calibration
@@ -123,9 +124,9 @@ def _video(name: str, right: str | None, layout: str | None) -> Iterator[Recorde
             "views, or right, the video of the other one"
         )
     if right is None:
-        frames = [(each, each) for each in frames_of_video(name, name, name, layout)]
+        frames = [(each, each) for each in frames_of_video(Input(name, name, name), layout)]
     else:
-        frames = frames_of_pair((name, name, name), (right, right, right))
+        frames = frames_of_pair(Input(name, name, name), Input(right, right, right))
     for one, other in frames:
         image = read_image(one.location, one.name)
         if layout is None:

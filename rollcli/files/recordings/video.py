@@ -23,7 +23,7 @@ from rollcli.errors import InputError, UsageError, as_usage
 from rollcli.files.bounded import state_of
 from rollcli.files.codecs.pictures import half_size
 from rollcli.files.codecs.raw_map import require_decoded_fits
-from rollcli.files.recordings.frames import RecordingFrame
+from rollcli.files.naming import Input
 
 _BOXES = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"styp")  # that MP4 and MOV begin with
 _EBML, _SEGMENT = 0x1A45DFA3, 0x18538067  # Matroska's
@@ -68,7 +68,7 @@ def _look_through(path: str, size: int, modified_ns: int, process: int, name: st
     return Video(count, decoder.width, decoder.height, broken)
 
 
-def frames_of_video(path: str, name: str, relative: str, layout: str | None) -> list[RecordingFrame]:
+def frames_of_video(source: Input, layout: str | None) -> list[Input]:
     """List the frames of a video; what is broken behind them is one more, which fails and says so.
 
     Raises
@@ -76,40 +76,38 @@ def frames_of_video(path: str, name: str, relative: str, layout: str | None) -> 
     UsageError
         See `look_through`; or its frames cannot be halved as `layout` says.
     """
-    return _frames_of(look_through(path, name), path, name, relative, layout)
+    return _frames_of(look_through(source.location, source.name), source, layout)
 
 
-def _frames_of(video: Video, path: str, name: str, relative: str, layout: str | None) -> list[RecordingFrame]:
-    stem = os.path.splitext(relative)[0]  # noqa: PTH122
+def _frames_of(video: Video, source: Input, layout: str | None) -> list[Input]:
+    path, name, stem = source.location, source.name, os.path.splitext(source.relative)[0]  # noqa: PTH122
     if layout is not None:
         with as_usage():
             half_size(video.width, video.height, layout, name)
     numbers = [f"{number:06d}" for number in range(video.frames)] + (["rest"] if video.broken else [])
-    return [RecordingFrame(f"{path}#{each}", f"{name}#{each}", f"{stem}_{each}.png", 0) for each in numbers]
+    return [Input(f"{path}#{each}", f"{name}#{each}", f"{stem}_{each}.png") for each in numbers]
 
 
-def frames_of_pair(
-    left: tuple[str, str, str], right: tuple[str, str, str]
-) -> list[tuple[RecordingFrame, RecordingFrame]]:
-    """Pair the frames of two videos, each a path, a name and a relative path, by their numbers.
+def frames_of_pair(left: Input, right: Input) -> list[tuple[Input, Input]]:
+    """Pair the frames of two videos by their numbers.
 
     Raises
     ------
     UsageError
         They differ in size; or in length, and neither is cut off.
     """
-    one, other = (look_through(*each[:2], decode=True) for each in (left, right))
+    one, other = (look_through(each.location, each.name, decode=True) for each in (left, right))
     if (one.width, one.height) != (other.width, other.height):
         raise UsageError(
-            f"{left[1]} has {one.width}x{one.height} px, {right[1]} {other.width}x{other.height}: give two "
-            "views of one size"
+            f"{left.name} has {one.width}x{one.height} px, {right.name} {other.width}x{other.height}: give "
+            "two views of one size"
         )
     if one.frames != other.frames and not (one.broken or other.broken):
         raise UsageError(
-            f"{left[1]} has {one.frames} frames, {right[1]} {other.frames}: they pair up by number, and "
+            f"{left.name} has {one.frames} frames, {right.name} {other.frames}: they pair up by number, and "
             "behind a frame that one camera dropped all pairs are wrong: cut both to the same moments"
         )
-    both = [_frames_of(video, *each, None) for video, each in ((one, left), (other, right))]
+    both = [_frames_of(video, each, None) for video, each in ((one, left), (other, right))]
     few = min(one.frames, other.frames)
     ends = [frames[-1] for frames, video in zip(both, (one, other), strict=True) if video.broken]
     return [*zip(both[0][:few], both[1][:few], strict=True), *((end, end) for end in ends)]

@@ -19,7 +19,7 @@ _REQUEST_S = 60.0  # a map of 10 MB at 1.4 Mbit/s takes as long
 DENIED = "access is denied; check the rights of these keys"
 _NO_BUCKET = "there is no such bucket"
 _EXPIRED = "the keys have expired; fetch new ones"
-_NO_OBJECT = "there is no such object"
+NO_OBJECT = "there is no such object"
 _CUT = "the answer of the store was cut short"
 _REFUSED = "the store refused the request"
 _ANSWERED = "the store answered"
@@ -100,7 +100,7 @@ def what_is_missing(error: Exception) -> str:
     """Tell a bucket that does not exist from an object."""
     text = _without_names(error)
     missing = any(f"<Code>{each}</Code>" in text for each in ("NoSuchBucket", "ContainerNotFound"))
-    return _NO_BUCKET if missing else _NO_OBJECT
+    return _NO_BUCKET if missing else NO_OBJECT
 
 
 def is_final(error: Exception) -> bool:
@@ -115,7 +115,7 @@ def is_final(error: Exception) -> bool:
 
 def holds_for_all(reason: str) -> bool:
     """Tell whether what a store objects to holds for every object of its bucket."""
-    of_one = reason in (DENIED, _NO_OBJECT, _CUT, _REFUSED) or reason.startswith(_ANSWERED)
+    of_one = reason in (DENIED, NO_OBJECT, _CUT, _REFUSED) or reason.startswith(_ANSWERED)
     return not of_one
 
 
@@ -195,21 +195,6 @@ def object_owner(url: str) -> str:
     return ""
 
 
-def object_exists(url: str) -> bool:
-    """Return whether there is an object of this name.
-
-    Raises
-    ------
-    InputError
-        The store does not answer, or does not let us look.
-    """
-    store, key = _open(url)
-    with _telling(url, "read", InputError), contextlib.suppress(FileNotFoundError):
-        _repeated(lambda: store.head(key))
-        return True
-    return False
-
-
 def object_problem(url: str) -> str:
     """Say what keeps an object from being read, and probably others; empty where nothing does.
 
@@ -262,8 +247,8 @@ def remove_object(url: str) -> None:
         _repeated(lambda: store.delete(key))
 
 
-def list_objects(url: str) -> Iterator[tuple[str, int]]:
-    """Yield the URL and size of each object below a prefix, in the store's order.
+def list_objects(url: str) -> Iterator[tuple[str, int, str]]:
+    """Yield URL, size and entity tag of each object below a prefix, in the store's order.
 
     Parameters
     ----------
@@ -275,20 +260,11 @@ def list_objects(url: str) -> Iterator[tuple[str, int]]:
     UsageError
         There is no such bucket, or it may not be listed.
     """
-    return ((found, meta["size"]) for found, meta in _list(url))
-
-
-def list_tags(url: str) -> Iterator[tuple[str, str]]:
-    """Yield the URL and entity tag of each object below a prefix, as `list_objects` does its size."""
-    return ((found, meta["e_tag"] or "") for found, meta in _list(url))
-
-
-def _list(url: str) -> Iterator[tuple[str, Any]]:
     store, prefix = _open(url)
     root = split_url(url)[0]
     with _telling(url, "listed", UsageError):
         for found in _listed(store, prefix.rstrip("/") or None):
-            yield f"{root}/{found['path']}", found
+            yield f"{root}/{found['path']}", found["size"], found["e_tag"] or ""
 
 
 def has_objects(url: str) -> bool:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Generic
 
 from rollcli import __version__
-from rollcli.errors import OutputError, UsageError, WorkerError, cause_of
+from rollcli.errors import OutputError, UsageError, WorkerError, reading
 from rollcli.extras import require_extra
 from rollcli.files.atomic import is_file, is_there, write_atomic
 from rollcli.files.storage import remove
@@ -306,11 +306,8 @@ def scheduler_address(given: str) -> str:
     if "://" in given or not (given.endswith(".json") or os.sep in given):
         return given
     try:
-        return str(json.loads(Path(given).read_bytes())["address"])
-    except OSError as error:
-        raise UsageError(
-            f"--scheduler {given}: the scheduler file cannot be read: {cause_of(error)}"
-        ) from error
+        with reading(f"--scheduler {given}", "the scheduler file", UsageError):
+            return str(json.loads(Path(given).read_bytes())["address"])
     except (ValueError, RecursionError, KeyError, TypeError) as error:
         raise UsageError(f"--scheduler {given}: is not a file that dask scheduler wrote") from error
 

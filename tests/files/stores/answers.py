@@ -75,7 +75,6 @@ DOINGS = {
     "read": (lambda: objects.read_object(URL), "yes", "untagged"),
     "read small": (lambda: objects.read_object(URL, 4), "yes", "untagged"),
     "owner": (lambda: objects.object_owner(URL), "owned", "yes"),
-    "exists": (lambda: objects.object_exists(URL), "yes"),
     "problem": (lambda: objects.object_problem(URL), "part"),
     "problem of a folder": (lambda: objects.folder_problem("s3://maps/p/"), "empty", "last"),
     "write": (lambda: objects.write_object(URL, b"5", "me"), "yes"),
@@ -89,7 +88,6 @@ DOINGS = {
         *("page last", "page later last", "page denied", "empty"),
     ),
     "list all": (lambda: list(objects.list_objects("s3://maps/")), "last"),
-    "tags": (lambda: list(objects.list_tags("s3://maps/p/")), "page last"),
     "has": (lambda: objects.has_objects("s3://maps/p/"), "last", "empty"),
 }
 
