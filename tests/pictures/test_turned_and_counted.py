@@ -81,7 +81,7 @@ def test_disparities_are_counted_in_the_bins_that_hold_them(monkeypatch, block):
     values = np.random.default_rng(2).uniform(-5, 60, (23, 12))
     values[3, 3], values[4] = np.nan, 0
     values[5, :3] = 8.0, 59.999, 70.0
-    for top, bins in ((64.0, 32), (50.0, 7)):
+    for top, bins in ((64.0, 32), (50.0, 7), (70.0, 1)):
         counts = v_disparity(values, bins=bins, max_disparity=top).counts
         expected = np.zeros((23, bins), int)
         for row, column in np.argwhere(np.isfinite(values) & (values > 0)):
