@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
+from rollcli.estimator.moments import strips
 from rollcli.stereo.misalignment import LEVEL, Misalignment
 
 _Number = TypeVar("_Number", np.float32, np.uint8)
@@ -172,8 +173,7 @@ _STRIP = 64  # rows: what they need of a view twice as large stays in the proces
 def grey_along(view: View, u: NDArray[np.float32], v: NDArray[np.float32]) -> View:
     """Return what `grey_between` does of the view `smoothed_between`, in rows that change little."""
     grey = np.empty(u.shape, np.uint8)
-    for first in range(0, len(u), _STRIP):
-        rows = slice(first, first + _STRIP)
+    for rows in strips(len(u), _STRIP):
         top = max(0, min(int(v[rows].min()), len(view)) - 3)  # smoothing sees a row beside each of a point's
         bottom = max(top, int(v[rows].max())) + 4
         grey[rows] = grey_between(smoothed_between(view[top:bottom]), u[rows], v[rows] - np.float32(top))[2]
