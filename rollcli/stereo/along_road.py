@@ -121,6 +121,11 @@ class Levelled:
         return None if found is None else _resized(found, self._small.shape, self.shape)
 
     @cached_property
+    def top(self) -> int:
+        """The first row that the plane reaches, and some to spare; the height where there is no plane."""
+        return self.shape[0] if self.plane is None else _first_row(self.plane, self.shape)
+
+    @cached_property
     def coarse(self) -> Map:
         """The map at a third of the size, enlarged, where a plane was found in it."""
         assert self._small is not None
@@ -162,16 +167,14 @@ def match_for_road(pair: Levelled, *, whole: bool = False) -> Map:
     first, count, options = pair.search
     if whole or pair.plane is None:
         disparity = without_lag(match_views(pair.whole, first, count, options), options.mode)
-        if pair.plane is not None and pair.road is not None:
-            top, near = _first_row(pair.plane, pair.shape), pair.road
-            np.copyto(disparity[top:], near.disparity, where=near.found & near.lies_on)
+        if (near := pair.road) is not None:
+            np.copyto(disparity[pair.top :], near.disparity, where=near.found & near.lies_on)
         return disparity
-    top = _first_row(pair.plane, pair.shape)
     disparity = pair.coarse.copy()
     if pair.road is None:
-        disparity[top:] = match_below(pair.whole, first, count, options, top)
+        disparity[pair.top :] = match_below(pair.whole, first, count, options, pair.top)
         return without_lag(disparity, options.mode)
-    disparity[top:] = pair.road.beside(pair.coarse[top:])
+    disparity[pair.top :] = pair.road.beside(pair.coarse[pair.top :])
     return disparity
 
 
@@ -214,8 +217,7 @@ class _Near(NamedTuple):
 
 def _match_along(pair: Levelled, plane: Plane, coarse: Map) -> _Near | None:
     """Match the rows that a plane reaches; None where too little of the `coarse` map is found there again."""
-    height, width = pair.shape
-    first = _first_row(plane, pair.shape)
+    (height, width), first = pair.shape, pair.top
     top = max(0, first - _BLOCK - 1)
     count = NARROWEST * math.ceil(width / _WIDTH)
     if height - top <= 2 * _BLOCK or width <= count + _BLOCK:
