@@ -190,7 +190,7 @@ def _solver_errors(
 
 def _methods(largest_turn: float, chosen: bool) -> dict[str, Callable[[NDArray[Any]], float]]:
     """Return each method as a function from a map to its angle."""
-    max_roll = min(_LARGEST_ROLL, Request().max_roll + max(0.0, largest_turn - math.radians(20)))
+    max_roll = min(_LARGEST_ROLL, Request.max_roll + max(0.0, largest_turn - math.radians(20)))
     settings = AreaSettings(max_roll, chosen=chosen)
 
     def by_areas(name: str, disparity: NDArray[Any]) -> float:
