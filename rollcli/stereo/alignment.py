@@ -429,31 +429,42 @@ def size_factor(shape: tuple[int, ...], pixels: int) -> float:
 class SmallViews:
     """The views of a pair at the size that they are measured at; large ones are shrunk once.
 
+    Parameters
+    ----------
+    whole : pair of ndarray of uint8, shape (H, W)
+        Left and right, as they are matched.
+    given : pair of ndarray of uint8, optional
+        The same before `downscale`, where there was any: at half the size a bend and a scale are told apart
+        half as surely.
+    pixels : int
+        Of the size measured at.
+
     Attributes
     ----------
     shape : tuple of int
         Of the whole views.
     whole : pair of ndarray of uint8, shape (H, W)
-        Left and right.
     factor : float
-        How many times smaller they are than the whole ones.
+        How many times smaller than the whole ones they are measured at; below 1 after a `downscale`.
     """
 
-    def __init__(self, whole: Views, pixels: int = _MEASURED_AT) -> None:
+    def __init__(self, whole: Views, given: Views | None = None, pixels: int = _MEASURED_AT) -> None:
+        self.whole, self._given = whole, given or whole
         self.shape = whole[0].shape
-        factor = size_factor(self.shape, pixels)
-        self.factor = round(factor) if factor > _WHOLE_FROM else factor
-        self.whole = whole
+        larger = self._given[0].shape
+        factor = size_factor(larger, pixels)
+        self._shrunk = round(factor) if factor > _WHOLE_FROM else factor
+        self.factor = self._shrunk * self.shape[1] / larger[1]
 
     @cached_property
     def views(self) -> Views:
         """Both views at that size; a pair that is level at the first look needs none."""
-        return shrink_both(self.whole, self.factor)
+        return shrink_both(self._given, self._shrunk)
 
     @cached_property
     def closer(self) -> "SmallViews":
         """The same pair at four times as many pixels, as far as it has them."""
-        return SmallViews(self.whole, _CLOSER)
+        return SmallViews(self.whole, self._given, _CLOSER)
 
     @cached_property
     def _texture(self) -> Texture:

@@ -32,7 +32,7 @@ from rollcli.stereo.misalignment_words import NOT_LEVELLED, NOT_TOLD_BY_ROWS, TO
 from rollcli.stereo.options import StereoOptions as StereoOptions
 from rollcli.stereo.refinement import refined
 from rollcli.stereo.sgbm import NARROWEST, usable_range
-from rollcli.stereo.views import Map, Views, prepare_views
+from rollcli.stereo.views import Map, Views, prepare_views, shrink
 
 # Shares of the textured blocks that tell
 _SURE = 0.3  # from here on the images are what they should be
@@ -253,11 +253,12 @@ def match_pair(
     InputError, UsageError
         See `compute_disparity`.
     """
-    views = prepare_views(left, right, options.downscale)
+    given = prepare_views(left, right)
+    views = shrink(given[0], options.downscale), shrink(given[1], options.downscale)
     width, first = views[0].shape[1], options.min_disparity
     if usable_range(1, first, width, options.block_size) < NARROWEST:
         raise InputError(f"images {width} px wide are too narrow to match from disparity {first} on")
-    small = SmallViews(views) if options.measures_alignment else None
+    small = SmallViews(views, given) if options.measures_alignment else None
     look = _look_as_given(views, options) if small is None else first_look(small)
     count = options.num_disparities
     if count is None:
@@ -277,17 +278,17 @@ def match_pair(
     def match(lies: Misalignment) -> Map:
         return match_for_road(levelled(lies))
 
-    given = None
+    told = None
     if small is None:
-        corrected, given = options.given_alignment(width)
+        corrected, told = options.given_alignment(width)
         measured, doubt = None, ""
         matched = match(corrected)
         if options.checks_alignment:
-            measured = SmallViews(views).measure(matched, corrected)
+            measured = SmallViews(views, given).measure(matched, corrected)
             doubt = "" if measured is None or _agrees(measured, corrected, views[0].shape) else CONTRADICTS
     else:
         matched, corrected, measured, doubt = _match_levelled(match, small, look, first < 0)
-    support = NOTHING_KNOWN if measured is None or corrected == LEVEL else given or measured.support
+    support = NOTHING_KNOWN if measured is None or corrected == LEVEL else told or measured.support
     if support.error > _OPEN_COLUMNS and not doubt:
         doubt = NOT_TOLD_BY_ROWS
 

@@ -24,8 +24,8 @@ Map = NDArray[np.float32]
 BLOCK = 8  # px: the side of what gets one shift where the grey levels of both views are compared
 
 
-def prepare_views(left: NDArray[Any], right: NDArray[Any], downscale: float) -> Views:
-    """Make both views grey, 8 bits deep and `downscale` times smaller.
+def prepare_views(left: NDArray[Any], right: NDArray[Any]) -> Views:
+    """Make both views grey and 8 bits deep.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def prepare_views(left: NDArray[Any], right: NDArray[Any], downscale: float) -> 
         raise InputError(f"left and right image differ in size: {sizes}")
     # cameras leave some of 16 bits unused: a fixed shift would make their images black
     brightest = max(int(left.max(initial=1)), int(right.max(initial=1)))
-    return _plain(left, brightest, downscale), _plain(right, brightest, downscale)
+    return _plain(left, brightest), _plain(right, brightest)
 
 
 def matched_shape(shape: tuple[int, ...], downscale: float) -> tuple[int, int]:
@@ -218,7 +218,7 @@ def _as_stored(grey: NDArray[Any], like: NDArray[_Number]) -> NDArray[_Number]:
     return grey.astype(like.dtype, copy=False)
 
 
-def _plain(image: NDArray[Any], brightest: int, downscale: float) -> View:
+def _plain(image: NDArray[Any], brightest: int) -> View:
     if image.dtype not in (np.uint8, np.uint16) or not (image.ndim == 2 or image.shape[2:] == (3,)):
         raise InputError(
             f"an image of {image.dtype} and shape {image.shape} cannot be matched: "
@@ -227,4 +227,4 @@ def _plain(image: NDArray[Any], brightest: int, downscale: float) -> View:
     if image.dtype == np.uint16:
         image = cv2.convertScaleAbs(image, alpha=255 / brightest)
     grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if image.ndim == 3 else image
-    return shrink(grey.astype(np.uint8, copy=False), downscale)
+    return grey.astype(np.uint8, copy=False)

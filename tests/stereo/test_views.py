@@ -11,7 +11,7 @@ from rollcli.stereo.views import prepare_views, sampled, shrink, shrink_both, sm
 def test_colours_are_weighted_as_the_eye_does():
     bgr = np.random.default_rng(0).integers(0, 256, (6, 7, 3), dtype=np.uint8)
 
-    left, right = prepare_views(bgr, bgr[:, ::-1].copy(), 1)
+    left, right = prepare_views(bgr, bgr[:, ::-1].copy())
 
     grey = bgr @ np.array([0.114, 0.587, 0.299])  # ITU-R BT.601
     assert left.dtype == np.uint8
@@ -24,22 +24,22 @@ def test_the_brightest_pixel_of_both_views_is_white():
     right = np.full((2, 3), 2000, np.uint16)
 
     for one, other in ((left, right), (right, left)):
-        views = prepare_views(one, other, 1)
+        views = prepare_views(one, other)
         for view, given in zip(views, (one, other), strict=True):
             np.testing.assert_allclose(view, given * (255 / 4000), atol=0.51)
 
 
 def test_eight_bits_stay_as_they_are_and_black_stays_black():
     dark = np.arange(12, dtype=np.uint8).reshape(3, 4)
-    np.testing.assert_array_equal(prepare_views(dark, dark, 1)[0], dark)
+    np.testing.assert_array_equal(prepare_views(dark, dark)[0], dark)
     for kind in (np.uint8, np.uint16):
         black = np.zeros((3, 4), kind)
-        assert not prepare_views(black, black, 1)[0].any()
+        assert not prepare_views(black, black)[0].any()
 
 
 def test_one_of_16_bits_is_not_taken_for_black():
     faint = np.eye(4, dtype=np.uint16)
-    assert (prepare_views(faint, 0 * faint, 1)[0] == 255 * np.eye(4)).all()
+    assert (prepare_views(faint, 0 * faint)[0] == 255 * np.eye(4)).all()
 
 
 @pytest.mark.parametrize("factor", [2, 3])
@@ -51,7 +51,7 @@ def test_a_small_view_has_the_means_of_the_pixels_it_stands_for(factor):
 
     np.testing.assert_allclose(both[0], means, atol=0.51)
     np.testing.assert_allclose(both[1], 255 - means, atol=0.51)
-    np.testing.assert_array_equal(prepare_views(view, view, factor)[1], both[0])
+    np.testing.assert_array_equal(shrink(view, factor), both[0])
     assert shrink(view, 1) is view
 
 
@@ -62,13 +62,13 @@ def test_a_small_view_has_the_means_of_the_pixels_it_stands_for(factor):
 def test_other_kinds_are_named_and_refused(shape, kind):
     image = np.ones(shape, kind)
     with pytest.raises(InputError, match="grey and BGR images of 8 and 16 bits can"):
-        prepare_views(image, image, 1)
+        prepare_views(image, image)
 
 
 @pytest.mark.parametrize("other", [(4, 6), (3, 5)])
 def test_views_of_two_sizes_are_refused(other):
     with pytest.raises(InputError, match=f"5x4 and {other[1]}x{other[0]}"):
-        prepare_views(np.ones((4, 5), np.uint8), np.ones((*other, 3), np.uint8), 1)
+        prepare_views(np.ones((4, 5), np.uint8), np.ones((*other, 3), np.uint8))
 
 
 def bilinear(view, u, v):
