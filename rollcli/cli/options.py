@@ -171,7 +171,8 @@ stereo_options = record(
         FilePath("auto|off|FILE"),
         "auto: measure how much lower, larger and how far turned the right image is against the left, "
         "correct that before matching, and say so in the row; off: match the images as they are; FILE: "
-        "correct all pairs as `rollcli rig --correction FILE` says.",
+        "correct all pairs as `rollcli rig --correction FILE` says, each by its own offset as far as the "
+        "drive leaves it open.",
         Needs(
             lambda ctx: ctx.params["vertical_offset"] == "auto",
             "--vertical-offset says how the right image lies",

@@ -2,15 +2,18 @@
 
 import json
 import math
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from functools import lru_cache
 from pathlib import Path
+from typing import NamedTuple
 
 from rollcli.errors import UsageError, reading
 from rollcli.stereo.misalignment import ColumnSupport, Misalignment
 
 _VALUES = ("right_lower_px", "right_clockwise_deg", "right_larger_percent", "right_twist_px")
+_OFFSET_CI95 = "right_lower_ci95_px"
 _COLUMNS = ("scale", "twist", "pitch", "slope_error")  # as of a `ColumnSupport`
+_REACH = 1.96  # standard errors: of an interval of 95 %
 _LARGEST = (100.0, 45.0, 50.0, 100.0)  # of each; what is more is damage
 CONTRADICTS = "the views do not lie as the correction says"
 """The doubt of a pair that was levelled as a file says, and is not level then."""
@@ -21,11 +24,43 @@ def columns_as_text(columns: ColumnSupport) -> dict[str, float]:
     return {name: float(f"{value:.6g}") for name, value in zip(_COLUMNS, astuple(columns), strict=True)}
 
 
-@lru_cache(maxsize=8)
-def read_correction(path: str) -> tuple[Misalignment, ColumnSupport | None, int]:
-    """Return how the right view lies, what of it is in the columns, and the width of the views, px.
+class Correction(NamedTuple):
+    """How the right views of a rig lie, of one width.
 
-    The columns are None where the pairs of the drive could not be looked at together.
+    Attributes
+    ----------
+    lies : Misalignment
+    columns : ColumnSupport or None
+        None where the pairs of the drive could not be looked at together.
+    offset_error : float
+        Standard error of the offset, px; infinite where the drive does not tell it.
+    width : int
+        Of the views, px.
+    """
+
+    lies: Misalignment
+    columns: ColumnSupport | None
+    offset_error: float
+    width: int
+
+    def resized(self, width: int) -> "Correction":
+        """Return the same of views so wide."""
+        factor = width / self.width
+        columns = self.columns and self.columns.resized(factor)
+        return Correction(self.lies.resized(factor), columns, factor * self.offset_error, width)
+
+    def of_pair(self, offset: float, error: float) -> Misalignment:
+        """Return how one pair lies whose own offset, px, was measured with this standard error.
+
+        The offset wanders with the temperature, by 0.5 px on a day of KITTI; the rest is the rig's.
+        """
+        share = 1 / (1 + (error / self.offset_error) ** 2) if self.offset_error else 0.0
+        return replace(self.lies, offset=self.lies.offset + share * (offset - self.lies.offset))
+
+
+@lru_cache(maxsize=8)
+def read_correction(path: str) -> Correction:
+    """Read what `rollcli rig --correction` wrote.
 
     Raises
     ------
@@ -39,10 +74,12 @@ def read_correction(path: str) -> tuple[Misalignment, ColumnSupport | None, int]
         width, height = int(found["width"]), int(found["height"])
         told = found.get("columns")
         columns = ColumnSupport(*(float(told[name]) for name in _COLUMNS)) if told is not None else None
+        reach = found.get(_OFFSET_CI95)
+        offset_error = math.inf if reach is None else float(reach) / _REACH
     except (ValueError, KeyError, TypeError, RecursionError, OverflowError) as error:
         raise UsageError(f"--align {path}: is no correction that `rollcli rig --correction` wrote") from error
     fits = all(math.isfinite(each) and abs(each) <= most for each, most in zip(values, _LARGEST, strict=True))
     fits &= columns is None or all(map(math.isfinite, astuple(columns)))
-    if not (fits and width > 0 and height > 0):
+    if not (fits and offset_error >= 0 and width > 0 and height > 0):
         raise UsageError(f"--align {path}: holds numbers that no rig has")
-    return Misalignment.of_values(values, height, width), columns, width
+    return Correction(Misalignment.of_values(values, height, width), columns, offset_error, width)

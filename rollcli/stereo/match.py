@@ -278,17 +278,24 @@ def match_pair(
     def match(lies: Misalignment) -> Map:
         return match_for_road(levelled(lies))
 
-    told = None
+    support, doubt = None, ""
     if small is None:
-        corrected, told = options.given_alignment(width)
-        measured, doubt = None, ""
+        told = options.given_alignment(width)
+        corrected, measured, support = told.lies, None, told.columns
         matched = match(corrected)
         if options.checks_alignment:
             measured = SmallViews(views, given).measure(matched, corrected)
-            doubt = "" if measured is None or _agrees(measured, corrected, views[0].shape) else CONTRADICTS
+        if measured is not None and _agrees(measured, corrected, views[0].shape):
+            found = told.of_pair(measured.misalignment.offset, measured.errors.offset)
+            corrected = found.rounded(*views[0].shape)
+        elif measured is not None:
+            doubt = CONTRADICTS
     else:
         matched, corrected, measured, doubt = _match_levelled(match, small, look, first < 0)
-    support = NOTHING_KNOWN if measured is None or corrected == LEVEL else told or measured.support
+    if corrected == LEVEL:
+        support = NOTHING_KNOWN
+    elif support is None:
+        support = NOTHING_KNOWN if measured is None else measured.support
     if support.error > _OPEN_COLUMNS and not doubt:
         doubt = NOT_TOLD_BY_ROWS
 
@@ -321,7 +328,7 @@ def _look_as_given(views: Views, options: StereoOptions) -> FirstLook:
     """Look at views that lie as the user says, where their range is not given."""
     if options.num_disparities is not None:
         return FirstLook(None, None)
-    return look_for_range((views[0], level(views[1], options.given_alignment(views[0].shape[1])[0])))
+    return look_for_range((views[0], level(views[1], options.given_alignment(views[0].shape[1]).lies)))
 
 
 def _match_levelled(

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 
 from rollcli.errors import UsageError
-from rollcli.stereo.correction import read_correction
-from rollcli.stereo.misalignment import ColumnSupport, Misalignment
+from rollcli.stereo.correction import Correction, read_correction
+from rollcli.stereo.misalignment import Misalignment
 
 MODES = ("sgbm", "hh", "3way")
 ALIGN = ("auto", "off")
@@ -75,13 +75,11 @@ class StereoOptions:
         if self.align not in ALIGN:
             read_correction(self.align)
 
-    def given_alignment(self, width: int) -> tuple[Misalignment, ColumnSupport | None]:
-        """Return how the right view lies as the user says, of views so wide; its columns if a file tells."""
+    def given_alignment(self, width: int) -> Correction:
+        """Return how the right view lies as the user says, of views so wide."""
         if self.vertical_offset is not None or self.align in ALIGN:
-            return Misalignment(self.vertical_offset or 0.0), None
-        lies, columns, of_width = read_correction(self.align)
-        factor = width / of_width
-        return lies.resized(factor), columns and columns.resized(factor)
+            return Correction(Misalignment(self.vertical_offset or 0.0), None, 0.0, width)
+        return read_correction(self.align).resized(width)
 
     @property
     def is_default(self) -> bool:

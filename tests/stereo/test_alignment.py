@@ -1,5 +1,6 @@
 """A right view that is shifted, turned or enlarged is levelled, so that it does not pass for a roll."""
 
+import json
 import math
 from pathlib import Path
 
@@ -211,6 +212,24 @@ def test_an_offset_that_is_given_is_not_measured(frame):
     match = match_pair(frame.left, seen_by(frame.right, lower=0.6), StereoOptions(vertical_offset=0.5))
 
     assert match.corrected == Misalignment(offset=0.5)
+
+
+@pytest.mark.parametrize(
+    ("ci95", "lower", "offset"), [(0.2, 1.15, 1.15), (0.004, 1.15, 1.0), (0.2, 2.0, 1.0)]
+)
+def test_the_offset_is_the_pairs_own_as_far_as_the_drive_leaves_it_open(frame, tmp_path, ci95, lower, offset):
+    height, width = frame.left.shape[:2]
+    lies = {"right_lower_px": 1.0, "right_clockwise_deg": 0, "right_larger_percent": 0, "right_twist_px": 0}
+    lies |= {"right_lower_ci95_px": ci95, "width": width, "height": height}
+    (tmp_path / "use.json").write_text(json.dumps(lies))
+
+    match = match_pair(
+        frame.left, seen_by(frame.right, lower=lower), StereoOptions(align=str(tmp_path / "use.json"))
+    )
+
+    assert match.corrected.offset == pytest.approx(offset, abs=0.03)
+    assert match.corrected.shifts(height, width)[1:] == pytest.approx([0] * 5, abs=1e-3)
+    assert ("as the correction says" in match.doubt) == (lower == 2)
 
 
 def test_align_off_measures_nothing(frame):
