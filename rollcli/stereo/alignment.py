@@ -40,7 +40,10 @@ _KNOWN = 0.7  # share of a block that has to have a disparity
 _RIDGE = 0.2  # squared grey levels per pixel: gradients along the rows below this are noise
 _LEAST = 2.0  # the same, across the rows: a block with less says nothing
 _ROUNDING = 0.99  # of a sum of 64 float32
-_MOST = 50.0  # and one with more counts no more than with this
+# One with more counts no more than with this: an edge such as the horizon is off by as much, however strong.
+# With 50, views of 1920x1080 that are turned aside were off by up to 0.5 degrees, with 30 by 0.16. With 20
+# they are a little better, and of 100 warped empty roads with much noise one is off by 0.2 without a word
+_MOST = 30.0
 _FEWEST = 40  # blocks
 _LONGEST_STEP = 1.5  # px, anywhere; along the rows, shorter ones take twice as many rounds
 # px: a round that moves less is the last. With 0.05, angles of 6 of 41 real pairs moved by more than 0.01
