@@ -64,6 +64,8 @@ class OutputError(RollcliError):
 
 def cause_of(error: OSError) -> str:
     """Return what the system says of an error, as the end of a sentence."""
+    if isinstance(error, FileExistsError):  # where a folder was to be made
+        return f"{error.filename} is no folder"
     return (error.strerror or str(error)).lower()
 
 

@@ -133,6 +133,12 @@ def test_each_setting_of_the_estimator_has_its_default_and_reaches_it(monkeypatc
         rollcli.estimate_roll(view, metod="exact")
 
 
+@pytest.mark.parametrize("shape", [(0, 0), (0, 5), (5, 0)])
+def test_a_crop_that_leaves_nothing_is_said(shape):
+    with pytest.raises(rollcli.EstimationError, match="no valid pixel"):
+        rollcli.estimate_roll(np.ones(shape))
+
+
 def test_an_image_that_was_not_read_is_said():
     image = np.zeros((100, 200), np.uint8)
     for call in (rollcli.compute_disparity, rollcli.estimate_pair):

@@ -148,7 +148,7 @@ stereo_options = record(
     ),
     option(
         "--uniqueness",
-        Number("PERCENT", at_least=0, at_most=100, whole=True),
+        Number("PERCENT", at_least=0, at_most=99, whole=True),
         "Margin by which the best match must win, percent.",
     ),
     option(

@@ -114,6 +114,9 @@ def _positive(values: Sequence[Value]) -> NDArray[Any]:
 
 
 def _name_decades(axis: Axis, names: Formatter) -> None:
-    """Let a logarithmic axis have names at its decades alone."""
+    """Let a logarithmic axis have names at its decades alone, of which it has two at least."""
+    low, high = np.log10(axis.get_view_interval())
+    if np.ceil(low) >= np.floor(high):
+        axis.set_view_interval(10 ** np.floor(low), 10 ** np.ceil(high), ignore=True)
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(names)

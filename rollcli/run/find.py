@@ -64,8 +64,8 @@ def read_calibration(path: str | os.PathLike[str], *right: str | os.PathLike[str
     --------
     A calibration in KITTI's form, of cameras half a metre apart:
 
-    >>> import tempfile
-    >>> file = Path(tempfile.mkdtemp(), "calib.txt")
+    >>> import pathlib, tempfile
+    >>> file = pathlib.Path(tempfile.mkdtemp(), "calib.txt")
     >>> left, right = "700 0 600 0 0 700 180 0 0 0 1 0", "700 0 600 -350 0 700 180 0 0 0 1 0"
     >>> characters = file.write_text(f"P0: {left}\\nP1: {right}\\n")
     >>> found = read_calibration(file)

@@ -124,7 +124,7 @@ def estimate_roll(
 
 def _likeness(values: NDArray[Any], seed: int) -> str:
     """Say what an array without a sure angle looks like instead of a map; empty when like nothing known."""
-    if values.dtype.kind not in "fiu":
+    if values.dtype.kind not in "fiu" or not values.size:
         return ""
     stored = Stored(values, "npy")
     disparity = to_disparity(stored, encoding="px").disparity

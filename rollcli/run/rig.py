@@ -252,8 +252,9 @@ def run_rig(options: RigOptions) -> int:
     reads = [*options.results, *filter(None, [options.against])]
     outputs = filter(None, [options.output, options.correction])
     writes = [each for each in outputs if not is_stream(each)]
-    if len(set(reads)) < len(reads):
-        raise UsageError(f"{next(each for each in reads if reads.count(each) > 1)}: is named twice")
+    for names in (reads, writes):
+        if len(set(names)) < len(names):
+            raise UsageError(f"{next(each for each in names if names.count(each) > 1)}: is named twice")
     check_options(options.gates)
     if listed_only(reads, writes, options.running):
         return 0

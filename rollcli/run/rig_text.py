@@ -263,7 +263,7 @@ _CALL = (
 )
 
 
-NO_COLUMNS = "its pairs cannot be read here, so each one tells by itself what of a scale is in the columns"
+NO_COLUMNS = "too few pairs of one size can be read here: each tells alone what of a scale is in the columns"
 
 
 def correction_text(health: Health | None, columns: ColumnSupport | None, results: Sequence[str]) -> str:

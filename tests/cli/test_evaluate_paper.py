@@ -101,6 +101,16 @@ def test_pixels_outside_of_the_region_count_for_nothing(tmp_path):
     assert float(exact[0]["mean_deg"]) == pytest.approx(0, abs=0.05)
 
 
+def test_errors_that_hardly_differ_have_a_scale(tmp_path):
+    write_maps(tmp_path / "maps", "a.npy")
+    (tmp_path / "truth.csv").write_text("file,roll_deg\na,-3.5\n")
+    assert paper(tmp_path, "--truth", "truth.csv", "--figure", "svg", "-q").status == 0
+    for name in ("fig6_accuracy", "methods_accuracy"):
+        drawn = (tmp_path / f"out/{name}.svg").read_text()
+        assert ">0.1°<" in drawn
+        assert ">1°<" in drawn
+
+
 def test_an_interrupted_evaluation_writes_nothing(tmp_path, monkeypatch):
     write_maps(tmp_path / "maps", "a.npy", "b.npy")
     examine_one = job.examine_file
