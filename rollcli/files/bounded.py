@@ -12,7 +12,7 @@ from rollcli.files.atomic import look_at
 # The largest map or picture that is decoded takes 512 MB (codecs/raw_map); a result of a million rows 200 MB
 MOST_BYTES = 2**30
 MOST_LISTED = 2**28  # of a list of files: two million paths
-MOST_SETTINGS = 2**20  # of a TOML file
+MOST_SETTINGS = 2**20  # of a TOML file, or a correction
 MOST_SMALL = 2**25  # bytes that a small compressed file may stand for: an empty map compresses well
 MOST_EXPANSION = 48  # bytes that each byte of a larger file may stand for; real maps reach 20
 _PIECE = 2**24  # bytes of a file that does not say its size

@@ -1,5 +1,6 @@
 """Find, sort and pair the files that a command works on."""
 
+import codecs
 import functools
 import os
 import re
@@ -219,6 +220,10 @@ class Manifest:
         self._path, self._places, self._count = path, array("Q"), 0
         before, key_before = "", ""
         for number, name in self._lines(0, self._places):
+            if "\0" in name:
+                raise UsageError(
+                    f"{path}: line {number}: holds a NUL byte; --sorted takes names in UTF-8, one a line"
+                )
             key = natural_key(name)
             if self._count and key <= key_before:
                 how = "is there twice" if name == before else f"sorts before {before}"
@@ -251,7 +256,7 @@ class Manifest:
         with reading(self._path, _LIST, UsageError), Path(self._path).open("rb") as file:
             file.seek(offset)
             for number, line in enumerate(file, 1):
-                if name := line.rstrip(b"\r\n"):
+                if name := line.rstrip(b"\r\n").removeprefix(codecs.BOM_UTF8):
                     if places is not None and count % _BLOCK == 0:
                         places.append(offset)
                     count += 1

@@ -487,6 +487,7 @@ _BOUNDS = {
     "pitch_deg": (-90.0, 90.0),
     "height_m": (0.0, math.inf),
 }
+_MOST = 1e40  # more than any float32 of a map; of what is larger squares cannot be summed
 
 
 def value_of(name: str, value: Any, where: str) -> Any:
@@ -536,7 +537,7 @@ def _number(kind: type, low: float, high: float, value: Any) -> Any:
     number = kind(value)
     # `1_0` is Python's notation, and a flag is no number
     is_one = "_" not in value if isinstance(value, str) else not isinstance(value, bool)
-    if not (is_one and low <= number <= high and abs(number) < math.inf):
+    if not (is_one and low <= number <= high and abs(number) < _MOST):
         raise ValueError(value)
     return number
 

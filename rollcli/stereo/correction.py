@@ -4,10 +4,10 @@ import json
 import math
 from dataclasses import astuple, replace
 from functools import lru_cache
-from pathlib import Path
 from typing import NamedTuple
 
-from rollcli.errors import UsageError, reading
+from rollcli.errors import UsageError, as_usage, reading
+from rollcli.files.bounded import MOST_SETTINGS, read_given
 from rollcli.stereo.misalignment import ColumnSupport, Misalignment
 
 _VALUES = ("right_lower_px", "right_clockwise_deg", "right_larger_percent", "right_twist_px")
@@ -68,8 +68,8 @@ def read_correction(path: str) -> Correction:
         The file cannot be read, or is no correction.
     """
     try:
-        with reading(f"--align {path}", kind=UsageError):
-            found = json.loads(Path(path).read_bytes())
+        with as_usage(), reading(f"--align {path}"):
+            found = json.loads(read_given(path, MOST_SETTINGS))
         values = [float(found[name]) for name in _VALUES]
         width, height = int(found["width"]), int(found["height"])
         told = found.get("columns")

@@ -60,6 +60,7 @@ needs_devices = pytest.mark.skipif(not Path("/dev/zero").exists(), reason="needs
         ("estimate", "maps", "--config", "/dev/zero"),
         ("estimate", "maps", "--calib", "/dev/zero"),
         ("estimate", "maps", "--mask", "/dev/zero"),
+        ("estimate", "--left", "maps", "--right", "maps", "--align", "/dev/zero"),
         ("estimate", "/dev/zero"),
         ("evaluate", "accuracy", "r.csv", "--truth", "/dev/zero"),
         ("evaluate", "accuracy", "/dev/zero", "--truth", "r.csv"),

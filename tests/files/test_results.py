@@ -53,6 +53,7 @@ HOSTILE = {
     "nested 100,000 deep": b'{"file": ' + b"[" * 100_000,
     "a number of 5,000 digits": b'{"file": "a", "status": "ok", "roll_deg": ' + b"1" * 5000 + b"}",
     "such a number in CSV": b"file,status,roll_deg,iterations\na,ok,1," + b"1" * 5000 + b"\n",
+    "a number whose square is none": b"file,status,roll_deg,roll_ci95_deg\na,ok,1,1e300\n",
     "a long status": b"file,status,roll_deg\na," + b"x" * 5000 + b",1\n",
 }
 

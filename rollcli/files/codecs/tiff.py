@@ -30,6 +30,7 @@ _NO_PREDICTOR, _FLOATING_POINT = 1, 3
 _HIGHEST_BIT_FIRST, _LOWEST_BIT_FIRST = 1, 2
 # width, height, bits, compression, black is 0, and of the strip its place, rows and bytes
 _TAGS = (256, 257, 258, 259, 262, 273, 278, 279)
+_EMPTY = 0  # in parts that are not there: no data in every encoding, and in masks
 _REVERSED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
 
 
@@ -139,13 +140,12 @@ def _decoded_parts(page: Any, shape: tuple[int, ...], part: tuple[int, int], dat
     floats = page.predictor == _FLOATING_POINT and dtype.kind == "f"
     if floats:
         page.predictor = _NO_PREDICTOR
-    values = np.empty(shape, page.dtype.newbyteorder("="))
+    values = np.full(shape, _EMPTY, page.dtype.newbyteorder("="))
     for index, (offset, count) in enumerate(zip(page.dataoffsets, page.databytecounts, strict=True)):
+        if count == 0:  # as GDAL leaves them out
+            continue
         _, (plane, _, top, left, _), (_, rows, _, _) = page.decode(None, index)
         place = values[plane, top : top + down, left : left + across]
-        if count == 0:  # as GDAL leaves them out
-            place[:] = page.nodata
-            continue
         packed = data[offset : offset + count].translate(bits)
         plain = _unpacked(compression, packed, rows, row, down)
         if floats:
@@ -293,6 +293,7 @@ def _decoded(
         with decoding():
             if int(page.compression) in _MAX_EXPANSION:
                 return _decoded_parts(page, shape, part, data)
+            page.nodata = _EMPTY
             values: NDArray[Any] = page.asarray()
             return values.reshape(shape)
     except DamagedPartError as error:

@@ -80,13 +80,13 @@ def test_compressions_of_another_package_name_it():
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
-@pytest.mark.parametrize(("nodata", "expected"), [(None, 0), ("-1", -1), ("1e300", 0), ("nan", 0)])
-def test_parts_that_a_sparse_file_leaves_out_hold_no_data(compression, nodata, expected):
+@pytest.mark.parametrize("nodata", [None, "7", "-40000", "1e300", "nan"])
+def test_parts_that_a_sparse_file_leaves_out_hold_no_data(compression, nodata):
     values = values_of("i2")
     stored = decode_stored(make_tiff(values, compression, tile=(16, 32), nodata=nodata, sparse=(1, 2)), "x")
 
-    values[:16, 32:] = expected
-    values[16:32, :32] = expected
+    values[:16, 32:] = 0
+    values[16:32, :32] = 0
     np.testing.assert_array_equal(stored.values, values)
 
 
