@@ -1,8 +1,8 @@
 """The carriageway, with its course, cross-section and surface, and the objects beside it and on it."""
 
 import math
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,12 +38,12 @@ class Piece(NamedTuple):
     camber: float = 0.0
     offset: float = 0.0
 
-    def elevation(self, lateral: float) -> float:
-        """Return the height at a lateral position, metres."""
+    def elevation(self, lateral: Any) -> Any:
+        """Return the height at lateral positions, metres."""
         return self.offset + (self.slope + self.camber / 2 * lateral) * lateral
 
-    def slope_at(self, lateral: float) -> float:
-        """Return the slope at a lateral position; positive where the road rises to the right."""
+    def slope_at(self, lateral: Any) -> Any:
+        """Return the slope at lateral positions; positive where the road rises to the right."""
         return self.slope + self.camber * lateral
 
     def curvature_at(self, lateral: float) -> float:
@@ -57,13 +57,14 @@ class CrossSection:
 
     pieces: tuple[Piece, ...]
 
-    def piece(self, lateral: float) -> Piece:
-        """Return the piece at a lateral position; beyond the edges the outermost one."""
-        return next((piece for piece in self.pieces if lateral < piece.end), self.pieces[-1])
+    def piece(self, lateral: Any) -> Piece:
+        """Return the piece at a lateral position, or at each of several; beyond the edges the outermost."""
+        at = np.searchsorted([piece.end for piece in self.pieces[:-1]], lateral, side="right")
+        return Piece(*np.array(self.pieces).T[:, at])
 
-    def elevation(self, lateral: float) -> float:
+    def elevation(self, lateral: Any) -> Any:
         """Return the height above the point below the rig, metres; beyond an edge that of the edge."""
-        inside = min(max(lateral, self.pieces[0].start), self.pieces[-1].end)
+        inside = np.clip(lateral, self.pieces[0].start, self.pieces[-1].end)
         return self.piece(inside).elevation(inside)
 
 
@@ -87,35 +88,26 @@ def cross_section(
     """
     middle, half = (left + right) / 2, (right - left) / 2
     start, end = middle - half, middle + half
-    pieces: tuple[Piece, ...]
+    pieces = [Piece(start, end)]
     if shape == "roof":
         rising = Piece(start, middle, crossfall, offset=-2 * crossfall * middle)
-        pieces = rising, Piece(middle, end, -crossfall)
+        pieces = [rising, Piece(middle, end, -crossfall)]
     elif shape in ("crown", "dish"):
         camber = (crossfall if shape == "dish" else -crossfall) / half
-        pieces = (Piece(start, end, -camber * middle, camber),)
+        pieces = [Piece(start, end, -camber * middle, camber)]
     elif shape == "superelevated":
-        pieces = (Piece(start, end, crossfall if bend < 0 else -crossfall),)
-    else:
-        pieces = (Piece(start, end),)
+        pieces = [Piece(start, end, crossfall if bend < 0 else -crossfall)]
     if gutter:
-        pieces = _add_gutters(pieces, gutter)
-    below_rig = CrossSection(pieces).elevation(0.0)
+        inner, outer = start + GUTTER_WIDTH, end - GUTTER_WIDTH
+        gutters = (
+            _straight(start, inner, inner, pieces[0], gutter),
+            _straight(outer, end, outer, pieces[-1], -gutter),
+        )
+        pieces[0] = pieces[0]._replace(start=inner)
+        pieces[-1] = pieces[-1]._replace(end=outer)
+        pieces = [gutters[0], *pieces, gutters[1]]
+    below_rig = CrossSection(tuple(pieces)).elevation(0.0)
     return CrossSection(tuple(piece._replace(offset=piece.offset - below_rig) for piece in pieces))
-
-
-def _add_gutters(pieces: tuple[Piece, ...], gutter: float) -> tuple[Piece, ...]:
-    """Replace the outer ends of the carriageway by straight pieces that fall outward more steeply."""
-    first, last = pieces[0], pieces[-1]
-    left, right = first.start + GUTTER_WIDTH, last.end - GUTTER_WIDTH
-    kept = [*pieces]
-    kept[0] = kept[0]._replace(start=left)
-    kept[-1] = kept[-1]._replace(end=right)
-    return (
-        _straight(first.start, left, left, first, gutter),
-        *kept,
-        _straight(right, last.end, right, last, -gutter),
-    )
 
 
 def _straight(start: float, end: float, at: float, beside: Piece, steeper: float) -> Piece:
@@ -384,8 +376,10 @@ class Site:
         """Add ground from `start` outward to `end`: from elevation `level` on with an outward `slope`."""
         signed = side * slope
         edges = (start, end) if side > 0 else (end, start)
-        ground = Ground(self.road.course, edges, (material,), FAR, signed, level - signed * start)
-        self.scene.surfaces.append(replace(ground, relief=self.road.relief))
+        shape = (signed, level - signed * start)
+        self.scene.surfaces.append(
+            Ground(self.road.course, edges, (material,), FAR, *shape, relief=self.road.relief)
+        )
 
     def add_sidewalk(self, side: int, edge: float, beyond: int | None = None) -> tuple[float, float]:
         """Add a kerb, a sidewalk and, of the material `beyond`, level ground behind it.
@@ -404,8 +398,8 @@ class Site:
             materials.append(beyond)
         foot = base + (self.road.relief.lowest if self.road.relief else 0.0)
         kerb = Wall(self.road.course, edge, foot, np.array([-50.0, FAR]), np.array([level]), stone)
-        strips = Ground(self.road.course, tuple(ends[::side]), tuple(materials[::side]), FAR, offset=level)
-        strips = replace(strips, relief=self.road.relief)
+        edges, course, relief = tuple(ends[::side]), self.road.course, self.road.relief
+        strips = Ground(course, edges, tuple(materials[::side]), FAR, offset=level, relief=relief)
         self.scene.surfaces += [kerb, strips]
         return level, edge + side * width
 
