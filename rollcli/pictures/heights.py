@@ -272,29 +272,21 @@ class _Profile:
         """Return the rows, px from this one, where the road has these disparities, and its rise there."""
         foot, rise = self._on_parabola(disparity)
         if self.further is not None:
-            last = len(self.further) - 1
-            steps = disparity * np.float32(_PER_PX)
-            foot += self.further.take(np.minimum(steps, np.float32(last), out=steps).astype(np.intp))
+            steps = np.minimum(disparity * np.float32(_PER_PX), np.float32(len(self.further) - 1))
+            foot += self.further.take(steps.astype(np.intp))
         return foot, rise
 
     def _on_parabola(self, disparity: Singles) -> tuple[Singles, Singles]:
-        rise = disparity - np.float32(self.disparity)
+        over = disparity - np.float32(self.disparity)
         if not self.bend:
-            foot = rise / np.float32(self.rise)
-            rise.fill(self.rise)
-            return foot, rise
+            return over / np.float32(self.rise), np.full_like(over, self.rise)
+        # beyond the end the parabola is flatter than any road, which goes on straight
         end = np.float32((_FLATTEST**2 - 1) * self.rise**2 / (4 * self.bend))
-        bent, straight = rise, None
-        if rise.min() < end if self.bend > 0 else rise.max() > end:
-            bent = np.maximum(rise, end) if self.bend > 0 else np.minimum(rise, end)
-            straight = rise - bent
-        rise = bent * np.float32(4 * self.bend)
-        rise += np.float32(self.rise**2)
-        np.sqrt(rise, out=rise)
-        bent /= (rise + np.float32(self.rise)) * np.float32(0.5)
-        if straight is not None:
-            bent += straight / rise
-        return bent, rise
+        bent = np.maximum(over, end) if self.bend > 0 else np.minimum(over, end)
+        rise = np.sqrt(bent * np.float32(4 * self.bend) + np.float32(self.rise**2))
+        foot = bent / ((rise + np.float32(self.rise)) * np.float32(0.5))
+        foot += (over - bent) / rise
+        return foot, rise
 
 
 def _profile_basis(x: NDArray[Any]) -> NDArray[Any]:
@@ -339,28 +331,24 @@ class _Heights:
 
     def fill(self, stored: NDArray[Any], rows: Singles, columns: Singles, heights: Singles) -> None:
         """Write the heights of the pixels of some rows and columns."""
-        d = stored.astype(np.float32)
+        model, profile = self.road.model, self.profile
         doffs = 0.0 if self.calibration is None else self.calibration.doffs
-        known = d > max(0.0, -doffs)
-        known &= d <= LARGEST
-        unknown = ~known
-        np.copyto(d, np.float32(self.profile.disparity), where=unknown)
-        shifted = d + np.float32(doffs) if doffs else d
+        d = stored.astype(np.float32)
+        known = (d > max(0.0, -doffs)) & (d <= LARGEST)
+        d[~known] = profile.disparity
         rows = rows[:, None]
-        camber = self._camber(d, self.across(columns, rows)) if self.road.model.camber else None
-        foot, rise = self.profile.at(d if camber is None else d * camber.rest)
+        camber = self._camber(d, self.across(columns, rows)) if model.camber else None
+        foot, rise = profile.at(d if camber is None else d * camber.rest)
         if camber is not None:
             rise *= camber.root
-        gap = foot - columns * np.float32(-math.sin(self.road.model.theta))
-        gap -= rows * np.float32(math.cos(self.road.model.theta)) - np.float32(self.profile.row)
+        gap = foot + columns * np.float32(math.sin(model.theta))
+        gap -= rows * np.float32(math.cos(model.theta)) - np.float32(profile.row)
         if self.calibration is None:
-            gap *= np.float32(self.profile.rise)
-            np.divide(gap, d, out=heights)
+            found = gap * np.float32(profile.rise) / d
         else:
-            length = self._length(self.calibration, shifted, foot, rise, camber)
-            length *= shifted
-            np.divide(gap, length, out=heights)
-        np.copyto(heights, np.float32(np.nan), where=unknown)
+            shifted = d + np.float32(doffs)
+            found = gap / (self._length(self.calibration, shifted, foot, rise, camber) * shifted)
+        heights[:] = np.where(known, found, np.float32(np.nan))
 
     def across(self, columns: Singles, rows: Singles) -> Singles:
         """Return the place across the road of pixels, px from the map's middle."""
@@ -370,24 +358,15 @@ class _Heights:
     def _camber(self, d: Singles, across: Singles) -> "_Camber":
         """Take from disparities what camber adds, which is of the disparity without it [RoadModel]."""
         camber = self.road.model.camber
-        side = across * np.float32(self.road.middle_rise)
-        side /= d
+        side = across * np.float32(self.road.middle_rise) / d
         # camber is not extrapolated beyond `FARTHEST_SIDE`, which is of the disparity without it
         most = np.float32(FARTHEST_SIDE / max(1 + camber / 2 * FARTHEST_SIDE**2, _FLATTEST))
-        beyond = np.abs(side) > most if max(side.max(), -side.min()) > most else None
-        if beyond is not None:
-            np.clip(side, -most, most, out=side)
-        root = side * side
-        root *= np.float32(-2 * camber)
-        root += 1
-        np.maximum(root, np.float32(_FLATTEST**2), out=root)
-        np.sqrt(root, out=root)
-        rest = root * np.float32(0.5)
-        rest += np.float32(0.5)
-        if beyond is not None:
-            np.copyto(side, 0, where=beyond)
-            np.copyto(root, 1, where=beyond)
-        return _Camber(across, side, rest, root)
+        inside = np.clip(side, -most, most)
+        root = np.maximum(inside * inside * np.float32(-2 * camber) + 1, np.float32(_FLATTEST**2))
+        root = np.sqrt(root, out=root)
+        rest, beyond = root * np.float32(0.5) + np.float32(0.5), inside != side
+        inside[beyond], root[beyond] = 0, 1
+        return _Camber(across, inside, rest, root)
 
     def _length(
         self,
@@ -400,29 +379,17 @@ class _Heights:
         """Return |q| of the planes that touch the road, by their rise, 1/m."""
         cosine, sine = math.cos(self.road.model.theta), math.sin(self.road.model.theta)
         aspect = calibration.fy / calibration.fx
-        at = np.array([[calibration.cx]], np.float32), np.array([[calibration.cy]], np.float32)
         along = calibration.cy * cosine - calibration.cx * sine - self.profile.row
-        ahead = (shifted if camber is None else shifted * camber.rest) / rise
-        ahead -= foot
-        ahead += np.float32(along)
-        square = np.float32(sine**2 + (aspect * cosine) ** 2)
-        lean: Singles | np.float32 = square
+        ahead = (shifted if camber is None else shifted * camber.rest) / rise - foot + np.float32(along)
+        lean: Singles | np.float32 = np.float32(sine**2 + (aspect * cosine) ** 2)
         if camber is not None:
-            tilt = camber.side / rise
-            tilt *= np.float32(self.road.model.camber * self.road.middle_rise)
-            ahead += tilt * (self.across(*at) - camber.across)
-            leant = tilt * np.float32(cosine**2 + (aspect * sine) ** 2)
-            if aspect != 1:
-                leant += np.float32(2 * (aspect**2 - 1) * cosine * sine)
-            leant *= tilt
-            leant += square
-            lean = leant
+            tilt = camber.side / rise * np.float32(self.road.model.camber * self.road.middle_rise)
+            centre = np.array([[calibration.cx]], np.float32), np.array([[calibration.cy]], np.float32)
+            ahead += tilt * (self.across(*centre) - camber.across)
+            skew = np.float32(2 * (aspect**2 - 1) * cosine * sine)
+            lean = (tilt * np.float32(cosine**2 + (aspect * sine) ** 2) + skew) * tilt + lean
         ahead *= np.float32(1 / calibration.fx)
-        ahead *= ahead
-        ahead += lean
-        length: Singles = np.sqrt(ahead, out=ahead)
-        length *= np.float32(1 / (calibration.baseline or 1.0))
-        return length
+        return np.sqrt(ahead * ahead + lean) * np.float32(1 / (calibration.baseline or 1.0))
 
 
 @dataclass(frozen=True)
