@@ -103,8 +103,6 @@ class _Search:
         return self._likelihood.fit(self._design(starts, drift))
 
     def _scored(self, starts: Sequence[int], drift: bool) -> Found:
-        if not is_told(self._design(starts, drift)):
-            return Found(tuple(starts), drift, -math.inf)
         penalty = TUNING.jump_penalty * len(starts) + TUNING.drift_penalty * drift
         return Found(tuple(starts), drift, self._fit(starts, drift).evidence - penalty)
 
