@@ -44,7 +44,7 @@ _OURS = re.compile(r"frame_\d{4,}\.png")
 def truth_csv(frames: Iterable[tuple[str, FrameSpec]]) -> bytes:
     """Write the table of known values, one row for each stem and its frame."""
     rows = [{"file": stem, **_truth_of(spec)} for stem, spec in frames]
-    return csv_table([[*rows[0]], *(row.values() for row in rows)])
+    return csv_table([rows[0], *(row.values() for row in rows)])
 
 
 def _truth_of(spec: FrameSpec) -> dict[str, str | int]:
@@ -159,7 +159,7 @@ class Dataset:
     @property
     def nearest_disparity(self) -> float:
         """The largest disparity of a flat road in any frame, pixels."""
-        return max(_nearest_disparity(spec) for spec in self.specs)
+        return max(map(_nearest_disparity, self.specs))
 
     def calibrations(self) -> dict[Path, bytes]:
         """Make names and contents: calib.txt where all frames share a rig, else one a frame in calib/."""
