@@ -12,7 +12,7 @@ from rollcli.files.stream import is_stream, write_output
 from rollcli.report.charts import all_charts
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import Chart
-from rollcli.report.sources import Choice, Subject, choose, subjects
+from rollcli.report.sources import Subject, choose, subjects
 from rollcli.report.summary import common_run, frame_count
 from rollcli.rig.drive.assess import RigAssessment, assess_rig
 from rollcli.run.options import EncodingOptions
@@ -72,7 +72,7 @@ def run_report(options: ReportOptions) -> ExitStatus:
         for jump in found.jumps
     ]
     chosen = choose(rows, options.gallery if options.output is not None else 0, sorted({*jumps}))
-    found = _subjects(parts, [(each.place, owners[each.place], rows[each.place]) for each in chosen], options)
+    found = _subjects(parts, [(place, owners[place], rows[place]) for place in chosen], options)
     reads = [path for each in found for path in (*each.frame.reads(), *each.images.values())]
     page = [] if options.output is None or is_stream(options.output) else [options.output]
     charts = all_charts(rows, rig)
@@ -96,7 +96,7 @@ def _require_charts_alone(options: ReportOptions) -> None:
 def _write(
     options: ReportOptions,
     result: Result,
-    chosen: Sequence[Choice],
+    chosen: Mapping[int, str],
     found: Sequence[Subject],
     rig: RigAssessment,
     charts: Mapping[str, Chart],
@@ -120,7 +120,7 @@ def _write(
         progress.note(f"{listed(list(files))}: written")
     if options.output is None:
         return ExitStatus.DONE
-    page = report_page(result, options, list(zip(chosen, pictures, strict=True)), rig, charts)
+    page = report_page(result, options, list(zip(chosen.items(), pictures, strict=True)), rig, charts)
     write_output(options.output, page, overwrite=options.running.overwrite)
     missing = [each.missing for each in pictures if each.empty]
     for reason in missing[:_REASONS]:
