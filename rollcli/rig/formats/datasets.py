@@ -16,14 +16,12 @@ from rollcli.rig.formats.fields import (
     Fields,
     File,
     Projection,
-    Size,
     json_values,
     keys_and_values,
     number,
     numbers,
     pair_of,
     require_one_pair,
-    size,
     size_of,
     swapped,
 )
@@ -96,14 +94,11 @@ def _kitti_fields(file: File, values: Mapping[str, str], size_key: str, left: st
     baseline, doffs = pair_of(views[0], views[1], file.name)
     if baseline < 0:
         raise swapped(file.name)
-    stated, found = values.get(size_key, "").split(), Size()
-    if stated:
-        if len(stated) != 2:
-            raise InputError(
-                f"{file.name}: {size_key} has {len(stated)} numbers: width and height are needed"
-            )
-        found = size_of(stated[0], stated[1], f"{file.name}: {size_key}")
-    return Fields(*views[0][:4], baseline, doffs, *found)
+    stated, what = values.get(size_key, "").split(), f"{file.name}: {size_key}"
+    if len(stated) not in (0, 2):
+        raise InputError(f"{what} has {len(stated)} numbers: width and height are needed")
+    width, height = stated or (None, None)
+    return Fields(*views[0][:4], baseline, doffs, *size_of(width, height, what))
 
 
 def read_middlebury(file: File) -> Fields:
@@ -123,7 +118,7 @@ def read_middlebury(file: File) -> Fields:
     if "baseline" not in values:
         return Fields(fx, fy, cx, cy, None, doffs, lacks="has no baseline: the file is cut off")
     baseline = _MM * number(values["baseline"], f"{file.name}: baseline")
-    found = size(values, "width", "height", f"{file.name}: width and height")
+    found = size_of(values.get("width"), values.get("height"), f"{file.name}: width and height")
     return Fields(fx, fy, cx, cy, baseline, doffs or 0.0, *found)
 
 
