@@ -86,7 +86,7 @@ class _Source:
         self.skip(count)
         self._passed = 0
         try:
-            if passed and self._file.seekable():
+            if passed and isinstance(self._file, io.BufferedReader):  # what is unpacked is sought slowly
                 self._file.seek(passed, os.SEEK_CUR)
             elif passed:
                 _exactly(self._file, passed)
