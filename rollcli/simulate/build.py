@@ -1,5 +1,6 @@
 """Build the scenes, each drawn from the seeds of a frame, and render their two views and true disparity."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -43,7 +44,8 @@ def build_scene(spec: FrameSpec) -> Scene:
 
 def road_camber(spec: FrameSpec) -> float:
     """Return the curvature across the road below the rig, 1/(camera height); a crown is negative."""
-    return carriageway_of(spec).section.piece(0.0).curvature_at(0.0) * spec.height
+    below = carriageway_of(spec).section.piece(0.0)
+    return float(below.camber / math.hypot(1.0, below.slope) ** 3) * spec.height
 
 
 def carriageway_of(spec: FrameSpec) -> Carriageway:

@@ -1,6 +1,5 @@
 """The carriageway, with its course, cross-section and surface, and the objects beside it and on it."""
 
-import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -45,10 +44,6 @@ class Piece(NamedTuple):
     def slope_at(self, lateral: Any) -> Any:
         """Return the slope at lateral positions; positive where the road rises to the right."""
         return self.slope + self.camber * lateral
-
-    def curvature_at(self, lateral: float) -> float:
-        """Return the second derivative of the height over the plane tangent at a lateral position, 1/m."""
-        return float(self.camber / math.hypot(1.0, self.slope_at(lateral)) ** 3)
 
 
 @dataclass(frozen=True)
@@ -145,7 +140,7 @@ class Carriageway:
 
         On a rough road: of the plane that fits the lane ahead, in place of what lies below the wheels.
         """
-        slope, rising = self.section.piece(0.0).slope_at(0.0), 0.0
+        slope, rising = self.section.piece(0.0).slope, 0.0
         if self.relief is not None:
             _, right, rising = lane_plane(self.relief)
             slope += right

@@ -321,10 +321,6 @@ def _edges(hits: Hits, width: int) -> NDArray[np.bool_]:
     shadow = hits.reads[SUN] == 0
     kind = (hits.surface.astype(np.int32) << 17) + (hits.material.astype(np.int32) << 1) + shadow
     kind = kind.reshape(-1, width)
-    edge = np.zeros(kind.shape, bool)
-    beside, below = np.diff(kind, axis=1) != 0, np.diff(kind, axis=0) != 0
-    edge[:, 1:] |= beside
-    edge[:, :-1] |= beside
-    edge[1:] |= below
-    edge[:-1] |= below
-    return edge.ravel()
+    padded = np.pad(kind, 1, mode="edge")
+    beside = (padded[1:-1, 2:] != kind) | (padded[1:-1, :-2] != kind)
+    return np.asarray(beside | (padded[2:, 1:-1] != kind) | (padded[:-2, 1:-1] != kind)).ravel()
