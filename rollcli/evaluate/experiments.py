@@ -132,13 +132,12 @@ def examine(
     EstimationError
         The pixels do not determine an angle.
     """
-    energy = _energy(disparity)
+    energy, (height, width) = _energy(disparity), disparity.shape
     theta = exact(energy).theta
-    height, width = disparity.shape
-    methods = _methods(max(map(abs, turns), default=0.0), chosen)
     rotated = [rotate_nearest(disparity, turn) for turn in turns]
+    energies = [_energy(each) for each in rotated]
 
-    def errors_of(method: Callable[[NDArray[Any]], float]) -> tuple[float | None, ...]:
+    def method_errors(method: Callable[[NDArray[Any]], float]) -> tuple[float | None, ...]:
         base = _angle(method, disparity) if truth is None else truth
         found = [_angle(method, each) for each in rotated]
         return tuple(
@@ -146,6 +145,14 @@ def examine(
             for angle, turn in zip(found, turns, strict=True)
         )
 
+    def solver_errors(solve: Solver) -> tuple[tuple[float, ...], ...]:
+        base = theta if truth is None else truth
+        return tuple(
+            tuple(angle_between(solve(each, SolverSettings(delta)).theta, base + turn) for delta in DELTAS)
+            for each, turn in zip(energies, turns, strict=True)
+        )
+
+    methods = _methods(max(map(abs, turns), default=0.0), chosen)
     return Findings(
         file=file,
         width=width,
@@ -155,8 +162,8 @@ def examine(
         gss=tuple(golden_section(energy, SolverSettings(delta)).iterations for delta in DELTAS),
         gd=tuple(gradient_descent(energy, SolverSettings(delta)).iterations for delta in DELTAS),
         sweep=_sweep(energy),
-        solver_errors=_solver_errors(rotated, turns, theta if truth is None else truth),
-        method_errors={name: errors_of(method) for name, method in methods.items()},
+        solver_errors={name: solver_errors(load_solver(name)) for name in SOLVERS},
+        method_errors={name: method_errors(method) for name, method in methods.items()},
     )
 
 
@@ -172,20 +179,6 @@ def _sweep(energy: Energy) -> tuple[tuple[int | None, ...], ...]:
         return found.iterations if min(angle_between(found.theta, end) for end in ends) <= delta else None
 
     return tuple(tuple(iterations(delta, rate) for rate in LAMBDAS) for delta in DELTAS)
-
-
-def _solver_errors(
-    rotated: Sequence[NDArray[Any]], turns: Sequence[float], base: float
-) -> dict[str, tuple[tuple[float, ...], ...]]:
-    energies = [_energy(each) for each in rotated]
-    solvers = {name: load_solver(name) for name in SOLVERS}
-    return {
-        name: tuple(
-            tuple(angle_between(solve(energy, SolverSettings(delta)).theta, base + turn) for delta in DELTAS)
-            for energy, turn in zip(energies, turns, strict=True)
-        )
-        for name, solve in solvers.items()
-    }
 
 
 def _methods(largest_turn: float, chosen: bool) -> dict[str, Callable[[NDArray[Any]], float]]:
@@ -217,38 +210,32 @@ def _angle(method: Callable[[NDArray[Any]], float], disparity: NDArray[Any]) -> 
 _MAX_ITERATIONS = 100  # of the unguarded descent
 
 
-@dataclass(frozen=True)
 class Textbook:
     """The method as the paper writes it: n x 3 matrices over every pixel, built anew at each angle.
 
-    The solvers on moments are timed and checked against it; nothing else uses it. It holds the valid pixels
-    of a map as columns of numbers; make it with `Textbook.of`.
+    The solvers on moments are timed and checked against it; nothing else uses it.
     [GD]: Fan, Wang, Liu, Pitas, "A Robust Roll Angle Estimation Algorithm Based on Gradient Descent",
     arXiv:1906.01894.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W)
+        Pixels; what is not above 0 and finite is no data.
 
     Attributes
     ----------
     u, v : ndarray, shape (n,)
-        Coordinates, moved to the centre of the map and divided by half its longer side.
+        Coordinates of the valid pixels, moved to the centre of the map and divided by half its longer side.
     d : ndarray, shape (n,)
         Disparity, px.
     """
 
-    u: Floats
-    v: Floats
-    d: Floats
-
-    @classmethod
-    def of(cls, disparity: NDArray[Any]) -> "Textbook":
-        """Take every valid pixel of a map (H, W)."""
+    def __init__(self, disparity: NDArray[Any]) -> None:
         grid = Grid.of_shape(*disparity.shape)
         rows, columns = np.nonzero((disparity > 0) & (disparity < np.inf))
-        u, v = columns.astype(np.float64), rows.astype(np.float64)
-        return cls(
-            (u - grid.centre_u) / grid.scale,
-            (v - grid.centre_v) / grid.scale,
-            disparity[rows, columns].astype(np.float64),
-        )
+        self.u: NDArray[Any] = (columns - grid.centre_u) / grid.scale
+        self.v: NDArray[Any] = (rows - grid.centre_v) / grid.scale
+        self.d: NDArray[Any] = disparity[rows, columns].astype(np.float64)
 
     def energy(self, theta: float) -> float:
         """Return E_min at `theta` [GD eq. 9], px^2."""
@@ -309,24 +296,25 @@ class Times:
 def time_solvers(disparity: NDArray[Any]) -> Times:
     """Time both solvers in all three forms on one map (H, W), px, 0 is no data."""
     peak = float(disparity.max())
-    energy, textbook = Energy.of(map_moments(disparity), peak), Textbook.of(disparity)
+    energy, textbook = Energy.of(map_moments(disparity), peak), Textbook(disparity)
 
-    def with_pass(solve: Solver, delta: float) -> None:
-        solve(Energy.of(map_moments(disparity), peak), SolverSettings(delta))
+    def timed(solve: Callable[[float], Solution], times: int) -> tuple[float, ...]:
+        return tuple(_best(partial(solve, delta), times) for delta in DELTAS)
+
+    def alone(solve: Solver, delta: float) -> Solution:
+        return solve(energy, SolverSettings(delta))
+
+    def with_pass(solve: Solver, delta: float) -> Solution:
+        return solve(Energy.of(map_moments(disparity), peak), SolverSettings(delta))
 
     seconds: dict[tuple[str, str], tuple[float, ...]] = {}
-    solvers: dict[str, Solver] = {"gss": golden_section, "gd": gradient_descent}
-    written_out: dict[str, Callable[[float], Solution]] = {
-        "gss": textbook.golden_section,
-        "gd": partial(textbook.gradient_descent, lambda0=LAMBDA0),
-    }
-    for name, solve in solvers.items():
-        seconds[name, "moments"] = tuple(
-            _best(partial(solve, energy, SolverSettings(delta)), 50) for delta in DELTAS
-        )
-        seconds[name, "with_pass"] = tuple(_best(partial(with_pass, solve, delta), 10) for delta in DELTAS)
+    descend: Callable[[float], Solution] = partial(textbook.gradient_descent, lambda0=LAMBDA0)
+    solvers = {"gss": (golden_section, textbook.golden_section), "gd": (gradient_descent, descend)}
+    for name, (solve, written_out) in solvers.items():
+        seconds[name, "moments"] = timed(partial(alone, solve), 50)
+        seconds[name, "with_pass"] = timed(partial(with_pass, solve), 10)
         with np.errstate(all="ignore"):  # unguarded, it may run away
-            seconds[name, "textbook"] = tuple(_best(partial(written_out[name], delta), 2) for delta in DELTAS)
+            seconds[name, "textbook"] = timed(written_out, 2)
     return Times(len(textbook.d), seconds)
 
 

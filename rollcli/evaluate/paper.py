@@ -120,7 +120,7 @@ def _write(
     found: "list[Findings]", failed: list[tuple[str, str]], times: "list[Times]", options: PaperOptions
 ) -> None:
     from rollcli.evaluate.paper_figures import paper_figures
-    from rollcli.evaluate.paper_page import all_tables, paper_page
+    from rollcli.evaluate.paper_page import all_tables, paper_page, table_csv
     from rollcli.pictures.figures import PRINT
     from rollcli.report.figures import chart_file
 
@@ -128,7 +128,7 @@ def _write(
     folder = Path(options.experiments.output)
     figures = paper_figures(tables)
     page = paper_page(tables, figures, found, failed, times, options)
-    written = {folder / f"{name}.csv": tables[name].csv() for name in TABLES} | {folder / PAGE: page}
+    written = {folder / f"{name}.csv": table_csv(tables[name]) for name in TABLES} | {folder / PAGE: page}
     if (kind := options.experiments.figure) is not None:
         for name, figure in figures.items():
             written[folder / f"{name}.{kind}"] = chart_file(figure, kind, PRINT)

@@ -11,7 +11,7 @@ from matplotlib.ticker import EngFormatter, Formatter, NullLocator, StrMethodFor
 from numpy.typing import NDArray
 
 from rollcli.estimator.request import LAMBDA0
-from rollcli.evaluate.paper_page import DELTAS_DEG, METHOD_NAMES, SOLVER_NAMES, Table, Value
+from rollcli.evaluate.paper_page import DELTAS_DEG, METHOD_NAMES, SOLVER_NAMES, Table, Value, column
 from rollcli.report.figures import Drawing, colour
 
 _COLOURS = {"gd": "c1", "gss": "c2", "exact": "c3"}
@@ -37,9 +37,10 @@ def paper_figures(tables: Mapping[str, Table]) -> dict[str, Drawing]:
 
 def _iterations(table: Table, axes: Axes, scale: float) -> None:
     for solver in ("gss", "gd"):
-        rows, name, look = table.where(solver=solver), SOLVER_NAMES[solver], _COLOURS[solver]
-        _line(axes, scale, _DEGREES, rows.column("mean"), name, look)
-        _line(axes, scale, _DEGREES, rows.column("paper"), f"{name}, paper", look, linestyle="none", **_OPEN)
+        name, look = SOLVER_NAMES[solver], _COLOURS[solver]
+        ours, papers = (column(table, each, solver=solver) for each in ("mean", "paper"))
+        _line(axes, scale, _DEGREES, ours, name, look)
+        _line(axes, scale, _DEGREES, papers, f"{name}, paper", look, linestyle="none", **_OPEN)
     axes.set(xlabel=_DELTA, ylabel="iterations", ylim=(0, None))
 
 
@@ -52,10 +53,11 @@ def _runtime(table: Table, axes: Axes, scale: float) -> None:
     }
     count = len(_DEGREES)
     for first, solver in ((0, "gss"), (count, "gd")):
-        rows, places = table.where(solver=solver), first + np.arange(count)
-        for column, (name, look) in forms.items():
+        places = first + np.arange(count)
+        for form, (name, look) in forms.items():
             # matplotlib's legend leaves out what begins with a stroke
-            _line(axes, scale, places, rows.column(column), f"_{name}" if first else name, look)
+            seconds = column(table, form, solver=solver)
+            _line(axes, scale, places, seconds, f"_{name}" if first else name, look)
         where: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "ha": "center", "va": "bottom"}
         axes.text(float(places.mean()), 1.02, SOLVER_NAMES[solver], **where)
     axes.set_xticks(range(2 * count), 2 * _DEGREES, rotation=45)
@@ -65,8 +67,8 @@ def _runtime(table: Table, axes: Axes, scale: float) -> None:
 
 def _sweep(table: Table, axes: Axes, scale: float) -> None:
     for k, delta in enumerate(DELTAS_DEG, 1):
-        rows, name = table.where(delta_deg=delta), f"tolerance {delta:g}°"
-        _line(axes, scale, rows.column("lambda0"), rows.column("mean"), name, f"c{k}", marker="")
+        rates, means = (column(table, each, delta_deg=delta) for each in ("lambda0", "mean"))
+        _line(axes, scale, rates, means, f"tolerance {delta:g}°", f"c{k}", marker="")
     axes.axvline(LAMBDA0, color=colour("muted"), linewidth=scale, linestyle=(0, (1.5, 1.5)))
     where: dict[str, Any] = {"xycoords": axes.get_xaxis_transform(), "va": "bottom"}
     axes.annotate(f" {LAMBDA0:g}", (LAMBDA0, 0), color=colour("muted"), **where)
@@ -77,21 +79,21 @@ def _solvers(table: Table, axes: Axes, scale: float) -> None:
     for solver, name in SOLVER_NAMES.items():
         # two of them often coincide: the last is drawn open, around the other
         mark = _OPEN if solver == "exact" else {}
-        errors = _positive(table.where(solver=solver).column("mean_deg"))
+        errors = _positive(column(table, "mean_deg", solver=solver))
         _line(axes, scale, _DEGREES, errors, name, _COLOURS[solver], **mark)
     axes.set(xlabel=_DELTA, yscale="log", ylabel="mean |Δθ|")
     _name_decades(axes.yaxis, StrMethodFormatter("{x:g}°"))
 
 
 def _methods(table: Table, axes: Axes, scale: float) -> None:
-    names = [METHOD_NAMES[str(method)] for method in table.column("method")]
+    names = [METHOD_NAMES[str(method)] for method in column(table, "method")]
     figures: dict[str, tuple[str, str, dict[str, Any]]] = {
         "median_deg": ("median", "c1", {"markersize": 12.0}),
         "p95_deg": ("95th percentile", "c2", {"marker": "D"}),
         "worst_deg": ("worst", "c5", {"markersize": 12.0, "markerfacecolor": "none"}),
     }
-    for column, (name, look, mark) in figures.items():
-        _line(axes, scale, _positive(table.column(column)), names, name, look, linestyle="none", **mark)
+    for figure, (name, look, mark) in figures.items():
+        _line(axes, scale, _positive(column(table, figure)), names, name, look, linestyle="none", **mark)
     axes.set(xscale="log", xlabel="|Δθ|")
     axes.margins(y=0.15)
     axes.invert_yaxis()

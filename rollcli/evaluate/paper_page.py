@@ -1,8 +1,7 @@
 """The paper's tables and figures as tables of numbers, each one CSV, and the page that shows them."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +16,7 @@ if TYPE_CHECKING:
     from rollcli.report.figures import Drawing
 
 Value = str | int | float | None
+Table = list[dict[str, Value]]  # rows of the same columns
 
 DELTAS_DEG = (0.1, 0.01, 0.001, 0.0001)
 # [GD] Tables I and II
@@ -33,90 +33,76 @@ METHOD_NAMES = {
 _WHOLE_NAMES = {"solver": SOLVER_NAMES, "method": METHOD_NAMES}
 
 
-@dataclass(frozen=True)
-class Table:
-    """A table of numbers.
+def table_csv(table: Table) -> bytes:
+    """Return a table as CSV: whole names, floats with seven digits, nothing where there is no value."""
+    return csv_table([table[0], *([_text(name, value) for name, value in row.items()] for row in table)])
 
-    Attributes
-    ----------
-    name : str
-        Of its file, without the ending.
-    columns : tuple of str
-    rows : tuple of tuple
-    """
 
-    name: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[Value, ...], ...]
+def _text(column: str, value: Value) -> str:
+    if isinstance(value, float):
+        return f"{value:.7g}"
+    text = "" if value is None else str(value)
+    return _WHOLE_NAMES.get(column, {}).get(text, text)
 
-    def csv(self) -> bytes:
-        """Return the table as CSV: whole names, floats with seven digits, nothing where there is no value."""
-        names = [_WHOLE_NAMES.get(column, {}) for column in self.columns]
-        rows = (
-            [each.get(text := _text(value), text) for each, value in zip(names, row, strict=True)]
-            for row in self.rows
-        )
-        return csv_table([self.columns, *rows])
 
-    def column(self, name: str) -> list[Value]:
-        """Return one column, from top to bottom."""
-        place = self.columns.index(name)
-        return [row[place] for row in self.rows]
-
-    def where(self, **values: Value) -> "Table":
-        """Return the rows that have these values."""
-        places = {self.columns.index(name): value for name, value in values.items()}
-        rows = tuple(row for row in self.rows if all(row[at] == value for at, value in places.items()))
-        return Table(self.name, self.columns, rows)
+def column(table: Table, name: str, **of: Value) -> list[Any]:
+    """Return one column, from top to bottom, of the rows that have these values."""
+    return [row[name] for row in table if of.items() <= row.items()]
 
 
 def maps_table(found: Sequence[Findings], failed: Sequence[tuple[str, str]]) -> Table:
-    """Return each map: its angle, and the iterations on it."""
-    counts = [
-        f"{SOLVER_NAMES[solver].replace(' ', '_')}_{delta:g}"
-        for solver in ("gss", "gd")
-        for delta in DELTAS_DEG
-    ]
-    columns = ("file", "width", "height", "pixels", "theta_deg", *counts, "message")
-    rows: list[tuple[Value, ...]] = [
-        (each.file, each.width, each.height, each.pixels, math.degrees(each.theta), *each.gss, *each.gd, "")
-        for each in found
-    ]
-    missing = (None,) * (len(columns) - 2)
-    rows += [(name, *missing, reason) for name, reason in failed]
-    return Table("maps", columns, tuple(rows))
+    """Return each map: its angle, and the iterations on it; of one that failed the reason."""
+    table = Table()
+    for each in found:
+        row = {name: getattr(each, name) for name in ("file", "width", "height", "pixels")}
+        row["theta_deg"] = math.degrees(each.theta)
+        for solver in PAPER_ITERATIONS:
+            name = SOLVER_NAMES[solver].replace(" ", "_")
+            row |= zip((f"{name}_{delta:g}" for delta in DELTAS_DEG), getattr(each, solver), strict=True)
+        table.append({**row, "message": ""})
+    nothing = dict.fromkeys(table[0])
+    return table + [{**nothing, "file": name, "message": reason} for name, reason in failed]
 
 
 def iterations_table(found: Sequence[Findings]) -> Table:
     """Return Table I: iterations of both solvers for each delta."""
-    columns = ("solver", "delta_deg", "delta_rad", "paper", "mean", "min", "max", "maps")
-    rows = []
-    for solver in ("gss", "gd"):
-        for k, delta in enumerate(DELTAS):
-            counts = [getattr(each, solver)[k] for each in found]
-            mean = float(np.mean(counts))
-            paper = PAPER_ITERATIONS[solver][k]
-            rows.append((solver, DELTAS_DEG[k], delta, paper, mean, min(counts), max(counts), len(counts)))
-    return Table("table1_iterations", columns, tuple(rows))
+    return [
+        {
+            "solver": solver,
+            "delta_deg": DELTAS_DEG[k],
+            "delta_rad": delta,
+            "paper": papers[k],
+            **_spread([getattr(each, solver)[k] for each in found]),
+        }
+        for solver, papers in PAPER_ITERATIONS.items()
+        for k, delta in enumerate(DELTAS)
+    ]
+
+
+def _spread(counts: Sequence[int]) -> dict[str, Value]:
+    known = (float(np.mean(counts)), min(counts), max(counts)) if counts else (None, None, None)
+    return dict(zip(("mean", "min", "max", "maps"), (*known, len(counts)), strict=True))
 
 
 def runtime_table(times: Sequence[Times]) -> Table:
     """Return Table II: mean run time of both solvers in three forms, seconds."""
-    columns = (
-        "solver",
-        "delta_deg",
-        "paper_s",
-        *(f"{form}_s" for form in FORMS),
-        "textbook_over_moments",
-        "maps",
-    )
-    rows = []
-    for solver in ("gss", "gd"):
-        for k, delta_deg in enumerate(DELTAS_DEG):
-            means = [float(np.mean([each.seconds[solver, form][k] for each in times])) for form in FORMS]
-            ratio = means[-1] / means[0]
-            rows.append((solver, delta_deg, PAPER_SECONDS[solver][k], *means, ratio, len(times)))
-    return Table("table2_runtime", columns, tuple(rows))
+    table = Table()
+    for solver, papers in PAPER_SECONDS.items():
+        for k, paper in enumerate(papers):
+            means = {
+                form: float(np.mean([each.seconds[solver, form][k] for each in times])) for form in FORMS
+            }
+            table.append(
+                {
+                    "solver": solver,
+                    "delta_deg": DELTAS_DEG[k],
+                    "paper_s": paper,
+                    **{f"{form}_s": mean for form, mean in means.items()},
+                    "textbook_over_moments": means["textbook"] / means["moments"],
+                    "maps": len(times),
+                }
+            )
+    return table
 
 
 def sweep_table(found: Sequence[Findings]) -> Table:
@@ -124,67 +110,60 @@ def sweep_table(found: Sequence[Findings]) -> Table:
 
     Over the maps on which it ended within delta of a minimum; `short` counts the others.
     """
-    rows: list[tuple[Value, ...]] = []
+    table = Table()
     for d, delta_deg in enumerate(DELTAS_DEG):
         for k, rate in enumerate(LAMBDAS):
             counts = [count for each in found if (count := each.sweep[d][k]) is not None]
-            spread = (float(np.mean(counts)), min(counts), max(counts)) if counts else (None, None, None)
-            rows.append((rate, delta_deg, *spread, len(counts), len(found) - len(counts)))
-    columns = ("lambda0", "delta_deg", "mean", "min", "max", "maps", "short")
-    return Table("fig3_lambda0", columns, tuple(rows))
-
-
-_ERRORS = ("mean_deg", "median_deg", "p95_deg", "worst_deg", "estimates")
+            row = {"lambda0": rate, "delta_deg": delta_deg, **_spread(counts)}
+            table.append({**row, "short": len(found) - len(counts)})
+    return table
 
 
 def solvers_table(found: Sequence[Findings]) -> Table:
     """Return Fig. 6: errors of the three solvers after known rotations, for each delta."""
-    rows = tuple(
-        (solver, DELTAS_DEG[k], *_errors(turn[k] for each in found for turn in each.solver_errors[solver]))
+    return [
+        {
+            "solver": solver,
+            "delta_deg": delta_deg,
+            **_errors([turn[k] for each in found for turn in each.solver_errors[solver]]),
+        }
         for solver in SOLVERS
-        for k in range(len(DELTAS))
-    )
-    return Table("fig6_accuracy", ("solver", "delta_deg", *_ERRORS), rows)
+        for k, delta_deg in enumerate(DELTAS_DEG)
+    ]
 
 
 def methods_table(found: Sequence[Findings]) -> Table:
     """Return the errors of our other methods after the same rotations."""
-    rows = []
+    table = Table()
     for method in METHODS:
         errors = [error for each in found for error in each.method_errors[method]]
         known = [error for error in errors if error is not None]
-        rows.append((method, *_errors(known), len(errors) - len(known)))
-    return Table("methods_accuracy", ("method", *_ERRORS, "no_angle"), tuple(rows))
+        table.append({"method": method, **_errors(known), "no_angle": len(errors) - len(known)})
+    return table
 
 
-def _errors(errors: Iterable[float]) -> tuple[float | int | None, ...]:
+def _errors(errors: Sequence[float]) -> dict[str, Value]:
     """Return mean, median, 95th percentile and largest, degrees; then how many there are."""
-    sizes = np.degrees(np.array(list(errors)))
-    if not len(sizes):
-        return None, None, None, None, 0
-    figures = (sizes.mean(), np.median(sizes), np.percentile(sizes, 95), sizes.max())
-    return (*map(float, figures), len(sizes))
-
-
-def _text(value: Value) -> str:
-    if value is None:
-        return ""
-    return f"{value:.7g}" if isinstance(value, float) else str(value)
+    names = ("mean_deg", "median_deg", "p95_deg", "worst_deg")
+    if not errors:
+        return {**dict.fromkeys(names), "estimates": 0}
+    sizes = np.degrees(errors)
+    figures = sizes.mean(), np.median(sizes), np.percentile(sizes, 95), sizes.max()
+    return {**dict(zip(names, map(float, figures), strict=True)), "estimates": len(errors)}
 
 
 def all_tables(
     found: Sequence[Findings], failed: Sequence[tuple[str, str]], times: Sequence[Times]
 ) -> dict[str, Table]:
-    """Return every table by its name."""
-    tables = (
-        maps_table(found, failed),
-        iterations_table(found),
-        runtime_table(times),
-        sweep_table(found),
-        solvers_table(found),
-        methods_table(found),
-    )
-    return {table.name: table for table in tables}
+    """Return every table by the name of its file, without the ending."""
+    return {
+        "maps": maps_table(found, failed),
+        "table1_iterations": iterations_table(found),
+        "table2_runtime": runtime_table(times),
+        "fig3_lambda0": sweep_table(found),
+        "fig6_accuracy": solvers_table(found),
+        "methods_accuracy": methods_table(found),
+    }
 
 
 _SHOWN = 50  # maps in the page's own list; the CSV has all
@@ -214,7 +193,7 @@ def paper_page(
         failed=failed,
         timed=_count(len(times), "map"),
         timed_pixels=f"{np.mean([each.pixels for each in times]):,.0f}",
-        ratio=f"{min(_numbers(tables['table2_runtime'], 'textbook_over_moments')):,.0f}",
+        ratio=f"{min(column(tables['table2_runtime'], 'textbook_over_moments')):,.0f}",
         turns=_turns(options),
         truth=options.experiments.truth,
         region=options.has_region,
@@ -236,22 +215,18 @@ def _count(number: int, noun: str) -> str:
     return f"{number} {noun}" + ("" if number == 1 else "s")
 
 
-def _numbers(table: Table, column: str) -> list[float]:
-    return [value for value in table.column(column) if isinstance(value, (int, float))]
-
-
 def _iterations(table: Table) -> list[tuple[str, list[str], list[str]]]:
     """Return name, the paper's column and ours, for each solver."""
     lines = []
-    for solver in ("gss", "gd"):
-        rows = table.where(solver=solver)
+    for solver in PAPER_ITERATIONS:
+        rows = [row for row in table if row["solver"] == solver]
         ours = [
-            f"{mean:g}" if low == high else f"{mean:.2f} ({low}–{high})"
-            for mean, low, high in zip(
-                *(_numbers(rows, name) for name in ("mean", "min", "max")), strict=True
-            )
+            f"{row['mean']:g}"
+            if row["min"] == row["max"]
+            else f"{row['mean']:.2f} ({row['min']}–{row['max']})"
+            for row in rows
         ]
-        lines.append((SOLVER_NAMES[solver], [f"{count}" for count in rows.column("paper")], ours))
+        lines.append((SOLVER_NAMES[solver], [str(row["paper"]) for row in rows], ours))
     return lines
 
 
@@ -264,13 +239,9 @@ def _runtimes(table: Table) -> list[tuple[str, str, list[str]]]:
         "moments_s": "here, moments alone",
     }
     return [
-        (
-            SOLVER_NAMES[solver],
-            form,
-            [_duration(each) for each in _numbers(table.where(solver=solver), column)],
-        )
-        for solver in ("gss", "gd")
-        for column, form in forms.items()
+        (SOLVER_NAMES[solver], form, list(map(_duration, column(table, name, solver=solver))))
+        for solver in PAPER_SECONDS
+        for name, form in forms.items()
     ]
 
 
@@ -282,7 +253,7 @@ def _methods(table: Table) -> list[tuple[str, ...]]:
             *("–" if value is None else f"{value:.5f}°" for value in figures),
             f"{missing}",
         )
-        for method, *figures, _, missing in table.rows
+        for method, *figures, _, missing in (row.values() for row in table)
     ]
 
 

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -73,14 +72,17 @@ def derotate(
     if roll == 0 or values.size == 0:
         return values
     valid = _validity(values, invalid)
-    turn = _Turn.of(values.shape, roll, expand)
-    kept = _not_nearest_to_invalid(valid, turn)
+    size = _turned_size(values.shape, roll, expand)
+    kept = _not_nearest_to_invalid(valid, size, roll)
     wide = np.float64 if values.dtype.itemsize > 2 and values.dtype != np.float32 else np.float32
     # a border without data, and a second one: pixels just outside have neighbours too
     padded = np.pad(np.where(valid, values, 0).astype(wide), 2)
-    result = np.full(turn.size, _no_data(values, valid), values.dtype)
-    for rows in strips(turn.size[0], _BLOCK // turn.size[1]):
-        turned, known = _interpolated(padded, turn.sources(rows))
+    result = np.full(size, _no_data(values, valid), values.dtype)
+    cosine, sine, (y, x) = math.cos(roll), math.sin(roll), _centred(size)
+    for rows in strips(size[0], _BLOCK // size[1]):
+        u = cosine * x - sine * y[rows, None] + (values.shape[1] - 1) / 2
+        v = sine * x + cosine * y[rows, None] + (values.shape[0] - 1) / 2
+        turned, known = _interpolated(padded, (v, u))
         known &= kept[rows]
         turned = np.rint(turned) if values.dtype.kind in "iu" else turned
         np.copyto(result[rows], turned, where=known, casting="unsafe")
@@ -106,10 +108,9 @@ def rotation_matrix(shape: tuple[int, ...], roll: float, *, expand: bool = False
         is at matrix K X: with square pixels, as a camera sees it that is turned about its axis and has its
         principal point at matrix (cx, cy, 1).
     """
-    turn = _Turn.of(shape, roll, expand)
-    matrix = np.eye(3)
-    matrix[:2, :2] = [[turn.cosine, turn.sine], [-turn.sine, turn.cosine]]
-    before, after = ((np.array(each[::-1]) - 1) / 2 for each in (turn.shape, turn.size))
+    cosine, sine = math.cos(roll), math.sin(roll)
+    matrix = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    before, after = ((np.array(each[::-1]) - 1) / 2 for each in (shape, _turned_size(shape, roll, expand)))
     matrix[:2, 2] = after - matrix[:2, :2] @ before
     return matrix
 
@@ -125,45 +126,19 @@ def _radians(roll: float | None, roll_deg: float | None) -> float:
     return angle
 
 
-@dataclass(frozen=True)
-class _Turn:
-    """A rotation about the centre of a map of `shape` onto one of `size`, both (rows, columns)."""
-
-    shape: tuple[int, int]
-    size: tuple[int, int]
-    cosine: float
-    sine: float
-
-    @classmethod
-    def of(cls, shape: tuple[int, ...], roll: float, expand: bool) -> "_Turn":
-        height, width = shape
-        cosine, sine = math.cos(roll), math.sin(roll)
-        size = (height, width)
-        if expand:
-            # as many more pixels on either side: the centre stays between the same pixels
-            size = (
-                height + 2 * math.ceil((height * abs(cosine) + width * abs(sine) - height) / 2 - 1e-9),
-                width + 2 * math.ceil((width * abs(cosine) + height * abs(sine) - width) / 2 - 1e-9),
-            )
-        return cls((height, width), size, cosine, sine)
-
-    def sources(self, rows: slice) -> tuple[Floats, Floats]:
-        """Return where in the map (v, u) the pixels of some rows of the result come from."""
-        y, x = _centred(self.size)
-        u: Floats = self.cosine * x - self.sine * y[rows, None] + (self.shape[1] - 1) / 2
-        v: Floats = self.sine * x + self.cosine * y[rows, None] + (self.shape[0] - 1) / 2
-        return v, u
-
-    def targets(self, pixels: Flags) -> tuple[Floats, Floats]:
-        """Return where in the result (y, x) some pixels of the map go."""
-        rows, columns = np.nonzero(pixels)
-        v, u = _centred(self.shape)
-        x: Floats = self.cosine * u[columns] + self.sine * v[rows] + (self.size[1] - 1) / 2
-        y: Floats = self.cosine * v[rows] - self.sine * u[columns] + (self.size[0] - 1) / 2
-        return y, x
+def _turned_size(shape: tuple[int, ...], roll: float, expand: bool) -> tuple[int, int]:
+    """Return rows and columns of a map of this shape once it is turned."""
+    height, width = shape
+    if not expand:
+        return height, width
+    cosine, sine = abs(math.cos(roll)), abs(math.sin(roll))
+    # as many more pixels on either side: the centre stays between the same pixels
+    down = math.ceil((height * cosine + width * sine - height) / 2 - 1e-9)
+    across = math.ceil((width * cosine + height * sine - width) / 2 - 1e-9)
+    return height + 2 * down, width + 2 * across
 
 
-def _centred(shape: tuple[int, int]) -> tuple[Floats, Floats]:
+def _centred(shape: tuple[int, ...]) -> tuple[Floats, Floats]:
     """Row and column coordinates, measured from the centre."""
     rows, columns = (np.arange(side, dtype=np.float64) - (side - 1) / 2 for side in shape)
     return rows, columns
@@ -178,12 +153,14 @@ def _validity(values: NDArray[Any], invalid: Iterable[float]) -> Flags:
     return valid
 
 
-def _not_nearest_to_invalid(valid: Flags, turn: _Turn) -> Flags:
+def _not_nearest_to_invalid(valid: Flags, size: tuple[int, int], roll: float) -> Flags:
     """Return the pixels of the result that no invalid pixel of the map falls on."""
-    kept = np.ones(turn.size, bool)
-    y, x = (np.floor(each + 0.5).astype(np.intp) for each in turn.targets(~valid))
-    inside = (y >= 0) & (y < turn.size[0]) & (x >= 0) & (x < turn.size[1])
-    kept[y[inside], x[inside]] = False
+    kept, (rows, columns), (v, u) = np.ones(size, bool), np.nonzero(~valid), _centred(valid.shape)
+    x = math.cos(roll) * u[columns] + math.sin(roll) * v[rows] + (size[1] - 1) / 2
+    y = math.cos(roll) * v[rows] - math.sin(roll) * u[columns] + (size[0] - 1) / 2
+    row, column = (np.floor(each + 0.5).astype(np.intp) for each in (y, x))
+    inside = (row >= 0) & (row < size[0]) & (column >= 0) & (column < size[1])
+    kept[row[inside], column[inside]] = False
     return kept
 
 

@@ -59,14 +59,10 @@ def drawing_style(size: Size, salt: str = "") -> Iterator[None]:
     """Draw as this program does, whatever a user has set for matplotlib; what he has set is put back."""
     with _SETTINGS, mpl.rc_context():
         mpl.rcdefaults()
-        sizes: dict[Any, Any] = {
-            "font.size": size.font,
-            "axes.linewidth": size.font / 13,
-            "grid.linewidth": size.font / 13,
-        }
-        sizes |= {f"{axis}tick.major.width": size.font / 13 for axis in "xy"}
-        sizes |= {f"{axis}tick.major.size": size.font / 4 for axis in "xy"}
-        sizes |= {"legend.fontsize": size.font, "axes.titlesize": size.font}
+        letters = dict.fromkeys(("font.size", "legend.fontsize", "axes.titlesize"), size.font)
+        lines = ("axes.linewidth", "grid.linewidth", "xtick.major.width", "ytick.major.width")
+        sizes: dict[Any, Any] = letters | dict.fromkeys(lines, size.font / 13)
+        sizes |= dict.fromkeys(("xtick.major.size", "ytick.major.size"), size.font / 4)
         mpl.rcParams.update(_STYLE | sizes | {"svg.hashsalt": f"rollcli {salt}"})
         yield
 
@@ -148,10 +144,9 @@ def v_disparity_figure(
             _draw_counts(right, counted[row], curves[row], height)
             left.set_box_aspect(height / width)
             right.set_box_aspect(height / width * _MAP_SHARE)
-        axes[0, 0].tick_params(labelbottom=False)
-        axes[0, 1].tick_params(labelbottom=False)
-        axes[1, 0].set_xlabel("column u, px")
-        axes[1, 1].set_xlabel("disparity, px")
+        for column, label in enumerate(("column u, px", "disparity, px")):
+            axes[0, column].tick_params(labelbottom=False)
+            axes[1, column].set_xlabel(label)
         figure.colorbar(
             picture, ax=axes[1, 0], location="bottom", label="disparity, px", aspect=30, extend="max"
         ).outline.set_visible(False)

@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 from rollcli.errors import UsageError
 from rollcli.estimator.estimate import RollEstimate
 from rollcli.estimator.moments import LARGEST, Floats, Singles, map_of, strips
-from rollcli.estimator.road.model import FARTHEST_SIDE, RoadModel
+from rollcli.estimator.road.model import FARTHEST_SIDE, Coordinate, RoadModel
 from rollcli.estimator.road.sample import medians_of
 from rollcli.files.results import Row
 from rollcli.rig.calibration import Calibration, require_calibration
@@ -95,6 +95,11 @@ class FittedRoad:
     def middle(self) -> tuple[float, float]:
         """The map's middle, column and row."""
         return (self.width - 1) / 2, (self.height - 1) / 2
+
+    def across(self, columns: Coordinate, rows: Coordinate) -> Coordinate:
+        """Return the place across the road of pixels, px from the map's middle."""
+        column, row = self.middle
+        return self.model.across(columns - column, rows - row)
 
     @property
     def middle_rise(self) -> float:
@@ -170,11 +175,11 @@ def heights_over(disparity: NDArray[Any], road: FittedRoad, calibration: Calibra
     if profile is None:
         return heights
     measured = calibration if unit_of(calibration) == METRES else None
-    over = _Heights(road, profile.along(disparity, road), measured)
+    profile = profile.along(disparity, road)
     columns = np.arange(road.width, dtype=np.float32)
     for some in strips(road.height, _BLOCK // road.width):
         rows = np.arange(some.start, some.stop, dtype=np.float32)
-        over.fill(disparity[some], rows, columns, heights[some])
+        heights[some] = _heights(disparity[some], columns, rows[:, None], road, profile, measured)
     return heights
 
 
@@ -258,43 +263,33 @@ class _Profile:
         """Return disparity, place across in camera heights and px above the parabola of some pixels."""
         down, right = (max(1, side // few) for side, few in zip(disparity.shape, _SAMPLED, strict=True))
         some = disparity[::down, ::right]
-        rows = np.arange(0, road.height, down, dtype=np.float32)
+        rows = np.arange(0, road.height, down, dtype=np.float32)[:, None]
         columns = np.arange(0, road.width, right, dtype=np.float32)
-        heights = np.empty(some.shape, np.float32)
-        over = _Heights(road, self, None)
-        over.fill(some, rows, columns, heights)
+        heights = _heights(some, columns, rows, road, self, None)
         known = np.isfinite(heights)
         d = some[known].astype(np.float32)
-        side = over.across(columns, rows[:, None])[known] * np.float32(road.middle_rise) / d
+        side = road.across(columns, rows)[known] * np.float32(road.middle_rise) / d
         return d, side, heights[known] * d / np.float32(self.rise)
 
     def at(self, disparity: Singles) -> tuple[Singles, Singles]:
         """Return the rows, px from this one, where the road has these disparities, and its rise there."""
         foot, rise = self._on_parabola(disparity)
         if self.further is not None:
-            last = len(self.further) - 1
-            steps = disparity * np.float32(_PER_PX)
-            foot += self.further.take(np.minimum(steps, np.float32(last), out=steps).astype(np.intp))
+            steps = np.minimum(disparity * np.float32(_PER_PX), np.float32(len(self.further) - 1))
+            foot += self.further.take(steps.astype(np.intp))
         return foot, rise
 
     def _on_parabola(self, disparity: Singles) -> tuple[Singles, Singles]:
-        rise = disparity - np.float32(self.disparity)
+        over = disparity - np.float32(self.disparity)
         if not self.bend:
-            foot = rise / np.float32(self.rise)
-            rise.fill(self.rise)
-            return foot, rise
+            return over / np.float32(self.rise), np.full_like(over, self.rise)
+        # beyond the end the parabola is flatter than any road, which goes on straight
         end = np.float32((_FLATTEST**2 - 1) * self.rise**2 / (4 * self.bend))
-        bent, straight = rise, None
-        if rise.min() < end if self.bend > 0 else rise.max() > end:
-            bent = np.maximum(rise, end) if self.bend > 0 else np.minimum(rise, end)
-            straight = rise - bent
-        rise = bent * np.float32(4 * self.bend)
-        rise += np.float32(self.rise**2)
-        np.sqrt(rise, out=rise)
-        bent /= (rise + np.float32(self.rise)) * np.float32(0.5)
-        if straight is not None:
-            bent += straight / rise
-        return bent, rise
+        bent = np.maximum(over, end) if self.bend > 0 else np.minimum(over, end)
+        rise = np.sqrt(bent * np.float32(4 * self.bend) + np.float32(self.rise**2))
+        foot = bent / ((rise + np.float32(self.rise)) * np.float32(0.5))
+        foot += (over - bent) / rise
+        return foot, rise
 
 
 def _profile_basis(x: NDArray[Any]) -> NDArray[Any]:
@@ -320,128 +315,64 @@ def _steady_fit(design: Floats, values: Floats, found: Flags) -> tuple[NDArray[A
     return fitted, weights
 
 
-@dataclass(frozen=True)
-class _Heights:
-    """What turns disparities into heights, some rows at a time.
+def _heights(
+    stored: NDArray[Any],
+    columns: Singles,
+    rows: Singles,
+    road: FittedRoad,
+    profile: _Profile,
+    calibration: Calibration | None,
+) -> Singles:
+    """Return the heights of the pixels of columns (W,) and rows (H, 1), shape (H, W).
 
-    Attributes
-    ----------
-    road : FittedRoad
-    profile : _Profile
-        Places along the road are from its row, places across it from the map's middle, px.
-    calibration : Calibration or None
-        With a baseline; None: heights are in camera heights.
+    The calibration has a baseline; None: heights are in camera heights.
     """
-
-    road: FittedRoad
-    profile: _Profile
-    calibration: Calibration | None
-
-    def fill(self, stored: NDArray[Any], rows: Singles, columns: Singles, heights: Singles) -> None:
-        """Write the heights of the pixels of some rows and columns."""
-        d = stored.astype(np.float32)
-        doffs = 0.0 if self.calibration is None else self.calibration.doffs
-        known = d > max(0.0, -doffs)
-        known &= d <= LARGEST
-        unknown = ~known
-        np.copyto(d, np.float32(self.profile.disparity), where=unknown)
-        shifted = d + np.float32(doffs) if doffs else d
-        rows = rows[:, None]
-        camber = self._camber(d, self.across(columns, rows)) if self.road.model.camber else None
-        foot, rise = self.profile.at(d if camber is None else d * camber.rest)
-        if camber is not None:
-            rise *= camber.root
-        gap = foot - columns * np.float32(-math.sin(self.road.model.theta))
-        gap -= rows * np.float32(math.cos(self.road.model.theta)) - np.float32(self.profile.row)
-        if self.calibration is None:
-            gap *= np.float32(self.profile.rise)
-            np.divide(gap, d, out=heights)
-        else:
-            length = self._length(self.calibration, shifted, foot, rise, camber)
-            length *= shifted
-            np.divide(gap, length, out=heights)
-        np.copyto(heights, np.float32(np.nan), where=unknown)
-
-    def across(self, columns: Singles, rows: Singles) -> Singles:
-        """Return the place across the road of pixels, px from the map's middle."""
-        column, row = self.road.middle
-        return self.road.model.across(columns - column, rows - row)
-
-    def _camber(self, d: Singles, across: Singles) -> "_Camber":
-        """Take from disparities what camber adds, which is of the disparity without it [RoadModel]."""
-        camber = self.road.model.camber
-        side = across * np.float32(self.road.middle_rise)
-        side /= d
-        # camber is not extrapolated beyond `FARTHEST_SIDE`, which is of the disparity without it
-        most = np.float32(FARTHEST_SIDE / max(1 + camber / 2 * FARTHEST_SIDE**2, _FLATTEST))
-        beyond = np.abs(side) > most if max(side.max(), -side.min()) > most else None
-        if beyond is not None:
-            np.clip(side, -most, most, out=side)
-        root = side * side
-        root *= np.float32(-2 * camber)
-        root += 1
-        np.maximum(root, np.float32(_FLATTEST**2), out=root)
-        np.sqrt(root, out=root)
-        rest = root * np.float32(0.5)
-        rest += np.float32(0.5)
-        if beyond is not None:
-            np.copyto(side, 0, where=beyond)
-            np.copyto(root, 1, where=beyond)
-        return _Camber(across, side, rest, root)
-
-    def _length(
-        self,
-        calibration: Calibration,
-        shifted: Singles,
-        foot: Singles,
-        rise: Singles,
-        camber: "_Camber | None",
-    ) -> Singles:
-        """Return |q| of the planes that touch the road, by their rise, 1/m."""
-        cosine, sine = math.cos(self.road.model.theta), math.sin(self.road.model.theta)
-        aspect = calibration.fy / calibration.fx
-        at = np.array([[calibration.cx]], np.float32), np.array([[calibration.cy]], np.float32)
-        along = calibration.cy * cosine - calibration.cx * sine - self.profile.row
-        ahead = (shifted if camber is None else shifted * camber.rest) / rise
-        ahead -= foot
-        ahead += np.float32(along)
-        square = np.float32(sine**2 + (aspect * cosine) ** 2)
-        lean: Singles | np.float32 = square
-        if camber is not None:
-            tilt = camber.side / rise
-            tilt *= np.float32(self.road.model.camber * self.road.middle_rise)
-            ahead += tilt * (self.across(*at) - camber.across)
-            leant = tilt * np.float32(cosine**2 + (aspect * sine) ** 2)
-            if aspect != 1:
-                leant += np.float32(2 * (aspect**2 - 1) * cosine * sine)
-            leant *= tilt
-            leant += square
-            lean = leant
-        ahead *= np.float32(1 / calibration.fx)
-        ahead *= ahead
-        ahead += lean
-        length: Singles = np.sqrt(ahead, out=ahead)
-        length *= np.float32(1 / (calibration.baseline or 1.0))
-        return length
+    cosine, sine, camber = math.cos(road.model.theta), math.sin(road.model.theta), road.model.camber
+    doffs = 0.0 if calibration is None else calibration.doffs
+    d = stored.astype(np.float32)
+    known = (d > max(0.0, -doffs)) & (d <= LARGEST)
+    d[~known] = profile.disparity
+    rest: Singles | np.float32 = np.float32(1)
+    root: Singles | np.float32 = np.float32(1)
+    if camber:
+        across = road.across(columns, rows)
+        side, rest, root = _cambered(d, across, road)
+    foot, rise = profile.at(d * rest)
+    rise *= root
+    gap = foot + columns * np.float32(sine) - (rows * np.float32(cosine) - np.float32(profile.row))
+    if calibration is None:
+        return np.where(known, gap * np.float32(profile.rise) / d, np.float32(np.nan))
+    # |q| of the planes that touch the road, by their rise, 1/m
+    aspect, shifted = calibration.fy / calibration.fx, d + np.float32(doffs)
+    along = calibration.cy * cosine - calibration.cx * sine - profile.row
+    ahead = shifted * rest / rise - foot + np.float32(along)
+    lean: Singles | np.float32 = np.float32(sine**2 + (aspect * cosine) ** 2)
+    if camber:
+        tilt = side / rise * np.float32(camber * road.middle_rise)
+        ahead += tilt * (np.float32(road.across(calibration.cx, calibration.cy)) - across)
+        skew = np.float32(2 * (aspect**2 - 1) * cosine * sine)
+        lean = (tilt * np.float32(cosine**2 + (aspect * sine) ** 2) + skew) * tilt + lean
+    ahead *= np.float32(1 / calibration.fx)
+    length = np.sqrt(ahead * ahead + lean) * np.float32(1 / (calibration.baseline or 1.0))
+    return np.where(known, gap / (length * shifted), np.float32(np.nan))
 
 
-@dataclass(frozen=True)
-class _Camber:
-    """What camber does to the road at some pixels; arrays (H, W).
+def _cambered(d: Singles, across: Singles, road: FittedRoad) -> tuple[Singles, Singles, Singles]:
+    """Take from disparities what camber adds, which is of the disparity without it [RoadModel].
 
-    Attributes
-    ----------
-    across : ndarray
-        Place across the road, px from the map's middle.
-    side : ndarray
-        The same in camera heights, of the disparity with camber; 0 beyond where camber is extrapolated.
-    rest : ndarray
-        The share of the disparity that is not camber's.
-    root : ndarray
-        Times the rise of the road without camber, by `rest`: its rise with it.
+    Returns
+    -------
+    tuple of ndarray
+        Places across in camera heights, of the disparity with camber, 0 beyond where camber is extrapolated;
+        the share of the disparity that is not camber's; and what makes of the rise of the road without
+        camber, by that share, its rise with it.
     """
-
-    across: Singles
-    side: Singles
-    rest: Singles
-    root: Singles
+    side = across * np.float32(road.middle_rise) / d
+    # camber is not extrapolated beyond `FARTHEST_SIDE`, which is of the disparity without it
+    most = np.float32(FARTHEST_SIDE / max(1 + road.model.camber / 2 * FARTHEST_SIDE**2, _FLATTEST))
+    inside = np.clip(side, -most, most)
+    root = np.maximum(inside * inside * np.float32(-2 * road.model.camber) + 1, np.float32(_FLATTEST**2))
+    root = np.sqrt(root, out=root)
+    rest, beyond = root * np.float32(0.5) + np.float32(0.5), inside != side
+    inside[beyond], root[beyond] = 0, 1
+    return inside, rest, root

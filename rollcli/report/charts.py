@@ -51,9 +51,7 @@ class FrameAxis:
         """Return the place of a frame, counted from 1; of half a number the middle between two."""
         if self.places is None:
             return number
-        lower = int(number)
-        upper = lower + (number > lower)
-        return (self.places[lower - 1] + self.places[upper - 1]) / 2
+        return (self.places[math.floor(number) - 1] + self.places[math.ceil(number) - 1]) / 2
 
     def layout(self) -> dict[str, Any]:
         """Return the axis as plotly takes it."""
@@ -88,11 +86,10 @@ def frame_axis(rows: Sequence[Row], rig: RigAssessment) -> FrameAxis:
 
 def drive_starts(rig: RigAssessment) -> set[int]:
     """Return the numbers, from 1, of the frames that begin a drive; no line is drawn into them."""
-    drives = [-1] * rig.count
+    drives = np.full(rig.count, -1)
     for number, drive in enumerate(rig.drives):
-        for place in drive.frames.tolist():
-            drives[place] = number
-    return {place + 1 for place in range(1, rig.count) if drives[place] != drives[place - 1]}
+        drives[drive.frames] = number
+    return {*(np.flatnonzero(np.diff(drives)) + 2).tolist()}
 
 
 def rig_traces(
@@ -155,38 +152,6 @@ _BEYOND = 0.35  # a suspect value may widen the view by this share of the others
 _WIDEST = 1.0  # degrees: a wider interval is seen to leave the view
 
 
-@dataclass(frozen=True, slots=True)
-class Value:
-    """A frame and its value; degrees or metres.
-
-    Attributes
-    ----------
-    number : int
-        Of the frame, from 1.
-    x : float
-        Where it stands along the chart.
-    value : float or None
-        None where the frame has none.
-    half_width : float or None
-        Of the 95 % interval.
-    row : Row
-    """
-
-    number: int
-    x: float
-    value: float | None
-    half_width: float | None
-    row: Row
-
-
-def values_of(rows: Sequence[Row], quantity: Quantity, axis: FrameAxis) -> list[Value]:
-    """Return the value of each frame."""
-    return [
-        Value(number, axis.at(number), getattr(row, quantity.column), getattr(row, quantity.ci_column), row)
-        for number, row in enumerate(rows, 1)
-    ]
-
-
 def label(row: Row, value: str) -> str:
     """Return the name of a frame, its value, and why it is suspect or has failed.
 
@@ -214,13 +179,19 @@ def view(rows: Sequence[Row], quantity: Quantity = ROLL) -> tuple[float, float]:
         Degrees or metres, the lower end first.
     """
     unit = quantity.scale
-    there = [each for each in values_of(rows, quantity, FrameAxis(len(rows))) if each.value is not None]
+    there = [row for row in rows if getattr(row, quantity.column) is not None]
     if not there:
         return -unit, unit
-    low, high = _span([each for each in there if each.row.status == "ok"] or there, unit)
+    columns = (quantity.column, quantity.ci_column)
+    values, halves = (np.array([getattr(row, name) or 0.0 for row in there]) for name in columns)
+    halves = np.minimum(halves, _WIDEST * unit)
+    sure = np.array([row.status == "ok" for row in there])
+    sure |= not sure.any()
+    low, high = float((values - halves)[sure].min()), float((values + halves)[sure].max())
     beyond = _BEYOND * (high - low) + 0.5 * unit
-    near = [value for each in there if low - beyond <= (value := each.value or 0.0) <= high + beyond]
-    low, high = min(low, *near), max(high, *near)  # without their intervals, which are wide
+    # without their intervals, which are wide
+    near = values[(low - beyond <= values) & (values <= high + beyond)].tolist()
+    low, high = min(low, *near), max(high, *near)
     margin = 0.06 * (high - low) + 0.05 * unit
     return round(low - margin, 3), round(high + margin, 3)
 
@@ -231,28 +202,16 @@ def outside(rows: Sequence[Row]) -> int:
     return sum(row.roll_deg is not None and not low <= row.roll_deg <= high for row in rows)
 
 
-def _span(values: Iterable[Value], unit: float) -> tuple[float, float]:
-    """From the lowest to the highest end of an interval."""
-    ends = [
-        (each.value or 0.0) + side * min(each.half_width or 0.0, _WIDEST * unit)
-        for each in values
-        for side in (-1, 1)
-    ]
-    return min(ends), max(ends)
-
-
 _MANY = 400  # up to so many frames each has a dot, and marks are large
 _MOST_BINS = 40
 _NARROWEST = 0.01  # degrees
 _FEW_BINS = 6
 _FAILED_AT = 0.035  # of the chart's height
+_SAID = "%{customdata}<extra></extra>"
 _AXIS_UNITS = {"deg": "degrees", "m": "m"}
 
 # as a legend calls the parts of the alignment, and their colours
 _PARTS = (("lower", "@c1"), ("turned", "@c2"), ("larger", "@c3"), ("twisted", "@c4"))
-_VALUES = ("x", "y", "customdata")
-
-Values = Sequence[Value]
 
 
 def all_charts(rows: Sequence[Row], rig: RigAssessment) -> dict[str, Chart]:
@@ -294,19 +253,18 @@ def alignment(rows: Sequence[Row], rig: RigAssessment) -> Chart:
             if getattr(row, quantity.column) is not None and row.height and row.width
         ]
         scale = [_shift_of(place, row) for _, row, _ in known]
-        dots = {
-            "type": "scatter",
-            "mode": "markers",
-            "name": words,
-            "marker": {"color": colour, "size": 5 if len(rows) <= _MANY else 2.5},
-            "x": [axis.at(number) for number, _, _ in known],
-            "y": [round(value * each, 3) for (_, _, value), each in zip(known, scale, strict=True)],
-            "customdata": [
-                label(row, f"{value:+.3f}{quantity.unit}: {value * each:+.2f} px")
-                for (_, row, value), each in zip(known, scale, strict=True)
+        shifts = [(row, value, value * each) for (_, row, value), each in zip(known, scale, strict=True)]
+        dots = scatter(
+            words,
+            "markers",
+            [axis.at(number) for number, _, _ in known],
+            [round(shift, 3) for _, _, shift in shifts],
+            customdata=[
+                label(row, f"{value:+.3f}{quantity.unit}: {shift:+.2f} px") for row, value, shift in shifts
             ],
-            "hovertemplate": "%{customdata}<extra></extra>",
-        }
+            hovertemplate=_SAID,
+            marker={"color": colour, "size": 5 if len(rows) <= _MANY else 2.5},
+        )
         data.append(dots)
         if scale:
             factor, line = float(np.median(scale)), {"color": colour, "width": 2}
@@ -351,20 +309,47 @@ def chart_over_frames(rows: Sequence[Row], quantity: Quantity, rig: RigAssessmen
     Chart
         Its name is the quantity's.
     """
-    axis = frame_axis(rows, rig)
-    values = values_of(rows, quantity, axis)
-    ends = view(rows, quantity)
-    suspect = [each for each in values if each.row.status == "suspect" and each.value is not None]
-    failed = [each for each in values if each.row.status == "error"]
-    sure = [each for each in values if each.row.status == "ok" and each.value is not None]
-    starts = drive_starts(rig)
+    axis, ends, starts = frame_axis(rows, rig), view(rows, quantity), drive_starts(rig)
+    values, halves = ([getattr(row, each) for row in rows] for each in (quantity.column, quantity.ci_column))
+    sure, suspect = (
+        [at for at, row in enumerate(rows) if row.status == status and values[at] is not None]
+        for status in ("ok", "suspect")
+    )
+    failed = [at for at, row in enumerate(rows) if row.status == "error"]
     many = len(rows) > _MANY
-    # what is sure lies on top: suspect marks of a long run would hide it
+
+    def marks(name: str, places: Sequence[int | None], mode: str = "markers", **look: Any) -> Trace:
+        """Return the frames at some places among the rows; None parts a line."""
+        x = [None if at is None else axis.at(at + 1) for at in places]
+        y = [None if at is None else values[at] for at in places]
+        said = [
+            None if at is None else label(rows[at], with_interval(values[at], halves[at], quantity))
+            for at in places
+        ]
+        return scatter(name, mode, x, y, customdata=said, hovertemplate=_SAID, **look)
+
+    bars: Trace = {"type": "data", "array": [halves[at] or 0.0 for at in suspect], "color": "@suspect"}
+    bars |= {"thickness": 1, "width": 0}
+    cross = {"color": "@error", "symbol": "x-thin", "line": {"color": "@error", "width": 2}}
+    edge = {"y": [_FAILED_AT] * len(failed), "yaxis": "y2"}  # they have no value
+    reasons = [label(rows[at], "") for at in failed]
+    stretches = _stretches(sure, starts)
+    line = {"line": {"color": "@c1", "width": 1.5}, "marker": {"color": "@c1"}}
+    # a browser takes a second for 10,000 dots, which a line of so many frames would hide anyway
+    alone = [stretch[0] for stretch in stretches if many and len(stretch) == 1]
+    # what is sure lies on top: suspect marks of a long run would hide it; after it in the legend
     data = [
-        _band(sure, starts),
-        _suspect(suspect, quantity, bars=not many),
-        *_lines(sure, starts, quantity, dots=not many),
-        _failed(failed, quantity),
+        _band(_stretches([at for at in sure if halves[at] is not None], starts), values, halves, axis),
+        marks("suspect", suspect, legendrank=1001, marker={"color": "@suspect", "symbol": "diamond"})
+        | ({} if many else {"error_y": bars}),
+        marks(
+            quantity.name,
+            [at for stretch in stretches for at in (*stretch, None)],
+            "lines" if many else "lines+markers",
+            **line,
+        ),
+        marks(f"{quantity.name}, alone", alone, showlegend=False, marker={"color": "@c1", "size": 2.5}),
+        marks("failed", failed, legendrank=1002, marker=cross) | edge | {"customdata": reasons},
     ]
     data = [trace for trace in data if trace["x"]]  # plotly's legend stumbles over what is empty
     for trace in data:
@@ -390,87 +375,30 @@ def chart_over_frames(rows: Sequence[Row], quantity: Quantity, rig: RigAssessmen
     return Chart(quantity.name, what, data, layout)
 
 
-def _lines(values: Values, starts: Set[int], quantity: Quantity, *, dots: bool) -> list[Trace]:
-    """Return the line and, where not every frame has a dot, the dots of frames that no line leads to.
-
-    A browser takes a second for 10,000 dots, which a line of so many frames would hide anyway.
-    """
-    stretches = _stretches(values, starts)
-    parts = [_points(stretch, quantity) for stretch in stretches]
-    line = {
-        "mode": "lines+markers" if dots else "lines",
-        "name": quantity.name,
-        "line": {"color": "@c1", "width": 1.5},
-        "marker": {"color": "@c1"},
-        **_points((), quantity),
-        **{name: [each for part in parts for each in (*part[name], None)] for name in _VALUES},
-    }
-    alone = {
-        "mode": "markers",
-        "name": f"{quantity.name}, alone",
-        "showlegend": False,
-        "marker": {"color": "@c1", "size": 2.5},
-        **_points([stretch[0] for stretch in stretches if len(stretch) == 1], quantity),
-    }
-    return [line] if dots else [line, alone]
-
-
-def _suspect(values: Values, quantity: Quantity, *, bars: bool) -> Trace:
-    widths = [each.half_width or 0.0 for each in values]
-    bar = {"type": "data", "array": widths, "color": "@suspect", "thickness": 1, "width": 0}
-    return {
-        "mode": "markers",
-        "name": "suspect",
-        "legendrank": 1001,  # after the line
-        "marker": {"color": "@suspect", "symbol": "diamond"},
-        **({"error_y": bar} if bars else {}),
-        **_points(values, quantity),
-    }
-
-
-def _failed(values: Values, quantity: Quantity) -> Trace:
-    """Along the lower edge, since they have no value."""
-    cross = {"color": "@error", "symbol": "x-thin", "line": {"color": "@error", "width": 2}}
-    labels = [label(each.row, "") for each in values]
-    look = {"y": [_FAILED_AT] * len(values), "yaxis": "y2", "customdata": labels}
-    points = _points(values, quantity) | look
-    return {"mode": "markers", "name": "failed", "legendrank": 1002, "marker": cross, **points}
-
-
-def _points(values: Values, quantity: Quantity) -> Trace:
-    said = [with_interval(each.value, each.half_width, quantity) for each in values]
-    return {
-        "type": "scatter",
-        "x": [each.x for each in values],
-        "y": [each.value for each in values],
-        "customdata": [label(each.row, words) for each, words in zip(values, said, strict=True)],
-        "hovertemplate": "%{customdata}<extra></extra>",
-    }
-
-
-def _band(values: Values, starts: Set[int]) -> Trace:
+def _band(
+    stretches: Iterable[Sequence[int]], values: Sequence[float], halves: Sequence[float], axis: FrameAxis
+) -> Trace:
     """Return one polygon for each stretch of frames that have an interval; None parts them."""
     x: list[float | None] = []
     y: list[float | None] = []
-    for stretch in _stretches([each for each in values if each.half_width is not None], starts):
-        along = [each.x for each in stretch]
-        ends = [(each.value or 0.0, each.half_width or 0.0) for each in stretch]
-        x += [*along, *reversed(along), None]
-        y += [round(value + half, 4) for value, half in ends]
-        y += [*(round(value - half, 4) for value, half in reversed(ends)), None]
+    for stretch in stretches:
+        along = [axis.at(at + 1) for at in stretch]
+        upper, lower = ([round(values[at] + side * halves[at], 4) for at in stretch] for side in (1, -1))
+        x += [*along, *along[::-1], None]
+        y += [*upper, *lower[::-1], None]
     line = {"color": "@band", "width": 1}  # a frame alone is seen too
     look = {"fill": "toself", "fillcolor": "@band", "line": line, "hoverinfo": "skip"}
     return scatter("95 % interval", "lines", x, y, **look)
 
 
-def _stretches(values: Values, starts: Set[int]) -> list[Values]:
-    """Return runs of frames that follow each other, each within one drive."""
+def _stretches(places: Sequence[int], starts: Set[int]) -> list[Sequence[int]]:
+    """Return runs of places that follow each other, each within one drive."""
     ends = [
-        place
-        for place, (before, after) in enumerate(pairwise(values), 1)
-        if after.number - before.number > 1 or after.number in starts
+        at
+        for at, (before, after) in enumerate(pairwise(places), 1)
+        if after - before > 1 or after + 1 in starts
     ]
-    return [values[start:end] for start, end in pairwise([0, *ends, len(values)]) if end > start]
+    return [places[start:end] for start, end in pairwise([0, *ends, len(places)]) if end > start]
 
 
 def histogram(rows: Sequence[Row]) -> Chart:

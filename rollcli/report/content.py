@@ -10,9 +10,8 @@ from rollcli.files.stores.locations import public_name
 from rollcli.report.charts import frame_axis, outside
 from rollcli.report.figures import with_still
 from rollcli.report.options import ReportOptions
-from rollcli.report.page import Chart, Rows, render_page
+from rollcli.report.page import Chart, render_page, script_json
 from rollcli.report.pictures import Pictures
-from rollcli.report.sources import Choice
 from rollcli.report.summary import (
     degrees,
     frame_count,
@@ -35,7 +34,7 @@ _LISTED = 20  # doubtful frames in a list of their own; the table has all
 def report_page(
     result: Result,
     options: ReportOptions,
-    shown: Sequence[tuple[Choice, Pictures]],
+    shown: Sequence[tuple[tuple[int, str], Pictures]],
     rig: RigAssessment,
     charts: Mapping[str, Chart],
 ) -> bytes:
@@ -76,7 +75,7 @@ def report_page(
         doubtful=doubtful[:_LISTED],
         more_doubtful=max(0, len(doubtful) - _LISTED),
         rows=_table(rows, rig),
-        gallery=[_card(rows, choice, pictures) for choice, pictures in shown],
+        gallery=[_card(place, rows[place], reason, pictures) for (place, reason), pictures in shown],
         angled=frame_count(sum(row.roll_deg is not None for row in rows)),
     )
 
@@ -100,34 +99,34 @@ def _others(rig: RigAssessment) -> list[str]:
     return others
 
 
-def _table(rows: Sequence[Row], rig: RigAssessment) -> Rows:
-    """Return what the table shows of each frame: number, file, status, roll, roll in words, reason."""
-    return Rows(
-        [
-            (
-                number,
-                row.file.encode("utf-8", "replace").decode(),
-                "failed" if row.status == "error" else row.status,
-                row.roll_deg,
-                with_interval(row.roll_deg, row.roll_ci95_deg),
-                row.message,
-            )
-            for number, row in enumerate(rows, 1)
-        ],
-        frame_axis(rows, rig).places,
-    )
+def _table(rows: Sequence[Row], rig: RigAssessment) -> str:
+    """Return what a script reads of each frame: number, file, status, roll, roll in words, reason.
+
+    `places` is where they stand along charts; None: at their numbers.
+    """
+    lines = [
+        (
+            number,
+            row.file.encode("utf-8", "replace").decode(),
+            "failed" if row.status == "error" else row.status,
+            row.roll_deg,
+            with_interval(row.roll_deg, row.roll_ci95_deg),
+            row.message,
+        )
+        for number, row in enumerate(rows, 1)
+    ]
+    return script_json({"rows": lines, "places": frame_axis(rows, rig).places})
 
 
-def _card(rows: Sequence[Row], choice: Choice, pictures: Pictures) -> dict[str, Any]:
-    row = rows[choice.place]
+def _card(place: int, row: Row, reason: str, pictures: Pictures) -> dict[str, Any]:
     roll = degrees(row.roll_deg, decimals(row.roll_ci95_deg))
     turned, above = f"de-rotated by {roll}", "Heights over the road"
     level = "v-disparity, de-rotated", "v-disparity once de-rotated"
     return {
-        "number": choice.place + 1,
+        "number": place + 1,
         "row": row,
         "roll": roll,
-        "reason": choice.reason,
+        "reason": reason,
         "missing": pictures.missing,
         "empty": pictures.empty,
         "show": "before" if pictures.map else "after",

@@ -72,22 +72,6 @@ def script_json(value: Any) -> str:
     return content
 
 
-@dataclass(frozen=True)
-class Rows:
-    """What a script of the page reads as the element `rows`; prints itself in a template.
-
-    `places` is where they stand along charts; None: at their numbers.
-    """
-
-    rows: Sequence[Sequence[Any]]
-    places: Sequence[float] | None = None
-
-    def __html__(self) -> str:
-        """Return the rows as JSON."""
-        content = script_json({"rows": self.rows, "places": self.places})
-        return f'<script type="application/json" id="rows">{content}</script>'
-
-
 def render_page(package: str, template: str, *scripts: str, **values: Any) -> bytes:
     """Fill a template that extends `page.html`; whatever it prints is escaped.
 

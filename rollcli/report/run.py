@@ -2,8 +2,7 @@
 
 import contextlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rollcli.errors import ExitStatus, InputError, UsageError
 from rollcli.extras import require_extra
@@ -13,7 +12,7 @@ from rollcli.files.stream import is_stream, write_output
 from rollcli.report.charts import all_charts
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import Chart
-from rollcli.report.sources import Choice, Subject, choose, subjects
+from rollcli.report.sources import Subject, choose, subjects
 from rollcli.report.summary import common_run, frame_count
 from rollcli.rig.drive.assess import RigAssessment, assess_rig
 from rollcli.run.options import EncodingOptions
@@ -55,26 +54,32 @@ def run_report(options: ReportOptions) -> ExitStatus:
     require_extra("report", "the page")
     if len(set(options.results)) < len(options.results):
         raise UsageError(f"{listed(options.results)}: a result is named twice")
-    joined = _joined(options.results)
-    rig = assess_rig(joined.rows, origins=joined.origins)
+    parts = [read_result(path) for path in options.results]
+    for path, part in zip(options.results, parts, strict=True):
+        if not part.rows:
+            raise InputError(f"{path}: has no rows: there is nothing to report")
+    # all rows in the order of the run, or one result after the other; a shard alone may be shown
+    owned = [(number, row) for number, part in enumerate(parts) for row in part.rows]
+    if len(parts) > 1:
+        owned = [owned[place] for place in order_of(parts).tolist()]
+    owners, rows = zip(*owned, strict=True)
+    result = Result(rows, common_run([part.run for part in parts]))
+    rig = assess_rig(rows, origins=origins_of(parts))
     jumps = [
         int(drive.frames[jump.frame])
         for drive in rig.drives
         for found in drive.quantities.values()
         for jump in found.jumps
     ]
-    chosen = choose(joined.rows, options.gallery if options.output is not None else 0, sorted({*jumps}))
-    found = _subjects(joined, chosen, options)
-    reads = [
-        *options.results,
-        *(path for each in found for path in (*each.frame.reads(), *each.images.values())),
-    ]
+    chosen = choose(rows, options.gallery if options.output is not None else 0, sorted({*jumps}))
+    found = _subjects(parts, [(place, owners[place], rows[place]) for place in chosen], options)
+    reads = [path for each in found for path in (*each.frame.reads(), *each.images.values())]
     page = [] if options.output is None or is_stream(options.output) else [options.output]
-    charts = all_charts(joined.rows, rig)
+    charts = all_charts(rows, rig)
     writes = [*(path for name in charts for path in options.chart_paths(name).values()), *page]
-    if listed_only(reads, writes, options.running):
+    if listed_only([*options.results, *reads], writes, options.running):
         return ExitStatus.DONE
-    return _write(options, joined, chosen, found, rig, charts)
+    return _write(options, result, chosen, found, rig, charts)
 
 
 def _require_charts_alone(options: ReportOptions) -> None:
@@ -90,8 +95,8 @@ def _require_charts_alone(options: ReportOptions) -> None:
 
 def _write(
     options: ReportOptions,
-    joined: "_Joined",
-    chosen: Sequence[Choice],
+    result: Result,
+    chosen: Mapping[int, str],
     found: Sequence[Subject],
     rig: RigAssessment,
     charts: Mapping[str, Chart],
@@ -115,9 +120,7 @@ def _write(
         progress.note(f"{listed(list(files))}: written")
     if options.output is None:
         return ExitStatus.DONE
-    page = report_page(
-        Result(joined.rows, joined.run), options, list(zip(chosen, pictures, strict=True)), rig, charts
-    )
+    page = report_page(result, options, list(zip(chosen.items(), pictures, strict=True)), rig, charts)
     write_output(options.output, page, overwrite=options.running.overwrite)
     missing = [each.missing for each in pictures if each.empty]
     for reason in missing[:_REASONS]:
@@ -146,46 +149,18 @@ def _take(found: Sequence[Subject], jobs: int | None) -> "list[Pictures]":
     return [pictures[place] for place in sorted(pictures)]
 
 
-@dataclass(frozen=True, slots=True)
-class _Joined:
-    """All rows in the order of the run, or one result after the other.
+def _subjects(
+    parts: Sequence[Result], chosen: Sequence[tuple[int, int, Row]], options: ReportOptions
+) -> list[Subject]:
+    """Find the files of the frames to show, each from where its own result lies.
 
-    `owners` are the parts that the rows are of.
+    Of each frame its place, which of the parts it is of, and its row.
     """
-
-    parts: Sequence[Result]
-    rows: tuple[Row, ...]
-    owners: Sequence[int]
-    origins: Sequence[str]
-    run: Mapping[str, Any] | None
-
-
-def _joined(paths: Sequence[str]) -> _Joined:
-    parts = list[Result]()
-    for path in paths:
-        parts.append(read_result(path))
-        if not parts[-1].rows:
-            raise InputError(f"{path}: has no rows: there is nothing to report")
-    rows = [row for part in parts for row in part.rows]
-    owners = [number for number, part in enumerate(parts) for _ in part.rows]
-    order = order_of(parts).tolist() if len(parts) > 1 else range(len(rows))  # a shard alone may be shown
-    return _Joined(
-        parts,
-        tuple(rows[place] for place in order),
-        [owners[place] for place in order],
-        origins_of(parts),
-        common_run([part.run for part in parts]),
-    )
-
-
-def _subjects(joined: _Joined, chosen: Sequence[Choice], options: ReportOptions) -> list[Subject]:
-    """Find the files of the frames to show, each from where its own result lies."""
     found: dict[int, Subject] = {}
-    for number, part in enumerate(joined.parts):
+    for number, part in enumerate(parts):
         made = recorded_options(part.run, run_path(part.path))
-        places = [each.place for each in chosen if joined.owners[each.place] == number]
-        rows = [joined.rows[place] for place in places]
-        if rows or len(joined.parts) == 1:
-            of_part = subjects(rows, part.path, options.images, made, fetch=options.fetch)
-            found |= dict(zip(places, of_part, strict=True))
-    return [found[each.place] for each in chosen]
+        mine = {place: row for place, owner, row in chosen if owner == number}
+        if mine or len(parts) == 1:
+            of_part = subjects([*mine.values()], part.path, options.images, made, fetch=options.fetch)
+            found |= dict(zip(mine, of_part, strict=True))
+    return [found[place] for place, _, _ in chosen]

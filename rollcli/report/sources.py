@@ -20,15 +20,7 @@ from rollcli.run.result_rows import frame_of_row
 JUMP, WIDEST, SUSPECT, SPREAD = "around a jump", "widest interval", "suspect", "evenly spread"
 
 
-@dataclass(frozen=True)
-class Choice:
-    """A frame to show, by its place among the rows, and why."""
-
-    place: int
-    reason: str
-
-
-def choose(rows: Sequence[Row], count: int, jumps: Sequence[int] = ()) -> list[Choice]:
+def choose(rows: Sequence[Row], count: int, jumps: Sequence[int] = ()) -> dict[int, str]:
     """Choose up to `count` frames that have an angle: those around jumps, and a third each of other kinds.
 
     Parameters
@@ -40,7 +32,8 @@ def choose(rows: Sequence[Row], count: int, jumps: Sequence[int] = ()) -> list[C
 
     Returns
     -------
-    list of Choice
+    dict of int to str
+        Places among the rows, and why they are chosen.
         The last frame before each jump and the first after it, for up to half of `count`, the latest jumps;
         the widest intervals, from the widest on; then suspect frames and others, in their order.
     """
@@ -49,16 +42,17 @@ def choose(rows: Sequence[Row], count: int, jumps: Sequence[int] = ()) -> list[C
     for jump in sorted(jumps)[::-1][: count // 4]:
         at = bisect.bisect_left(angled, jump)
         around |= dict.fromkeys(angled[max(at - 1, 0) : at + 1])
-    chosen = [Choice(place, JUMP) for place in sorted(around)]
-    rest = _without(angled, chosen)
+    chosen = dict.fromkeys(sorted(around), JUMP)
     share = (count - len(chosen)) // 3
-    widths = [(-(rows[place].roll_ci95_deg or 0.0), place) for place in rest]
-    chosen += [Choice(place, WIDEST) for width, place in sorted(widths)[:share] if width < 0]
-    rest = _without(angled, chosen)
-    doubtful = [place for place in rest if rows[place].status == "suspect"]
-    chosen += [Choice(place, SUSPECT) for place in spread(doubtful, share)]
-    rest = _without(angled, chosen)
-    return chosen + [Choice(place, SPREAD) for place in spread(rest, count - len(chosen))]
+
+    def left() -> list[int]:
+        return [place for place in angled if place not in chosen]
+
+    widths = [(-(rows[place].roll_ci95_deg or 0.0), place) for place in left()]
+    chosen |= {place: WIDEST for width, place in sorted(widths)[:share] if width < 0}
+    doubtful = [place for place in left() if rows[place].status == "suspect"]
+    chosen |= dict.fromkeys(spread(doubtful, share), SUSPECT)
+    return chosen | dict.fromkeys(spread(left(), count - len(chosen)), SPREAD)
 
 
 def spread(places: Sequence[int], count: int) -> list[int]:
@@ -66,11 +60,6 @@ def spread(places: Sequence[int], count: int) -> list[int]:
     if count >= len(places):
         return list(places)
     return [places[(2 * i + 1) * len(places) // (2 * count)] for i in range(count)]
-
-
-def _without(places: Sequence[int], chosen: Sequence[Choice]) -> list[int]:
-    taken = {each.place for each in chosen}
-    return [place for place in places if place not in taken]
 
 
 @dataclass(frozen=True, slots=True)

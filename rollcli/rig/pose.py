@@ -156,17 +156,10 @@ def _half_widths(tangent: Tangent, calibration: Calibration, pose: Pose) -> tupl
     changes = tangent.changes
     if changes is None:
         return None, None
+    theta, row, disparity, slope = tangent.theta, tangent.row, tangent.disparity, tangent.slope
     moved = [
-        pose_of(
-            replace(
-                tangent,
-                theta=tangent.theta + theta,
-                disparity=tangent.disparity + disparity,
-                slope=tangent.slope + slope,
-            ),
-            calibration,
-        )
-        for disparity, slope, theta in changes.tolist()
+        pose_of(Tangent(theta + turned, row, disparity + nearer, slope + steeper), calibration)
+        for nearer, steeper, turned in changes.tolist()
     ]
     pitch = TUNING.factor * math.hypot(*(each.pitch - pose.pitch for each in moved))
     heights = [each.height - pose.height for each in moved if each.height and pose.height]

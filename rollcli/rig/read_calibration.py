@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rollcli.errors import InputError, UsageError
 from rollcli.rig.calibration import Calibration, CalibrationOptions
@@ -97,14 +97,11 @@ def _read(files: Sequence[File]) -> Fields:
 
 
 def _overridden(fields: Fields, given: CalibrationOptions) -> Fields:
-    if given.focal is not None:
-        fields = replace(fields, fx=given.focal, fy=given.focal)
-    if given.principal_point is not None:
-        fields = replace(fields, cx=given.principal_point[0], cy=given.principal_point[1])
-    if given.baseline is not None:
-        # what the file's notes say is about its own baseline
-        fields = replace(fields, baseline=given.baseline, notes=())
-    return fields if given.doffs is None else replace(fields, doffs=given.doffs)
+    cx, cy = given.principal_point or (None, None)
+    numbers: dict[str, Any] = {"fx": given.focal, "fy": given.focal, "cx": cx, "cy": cy, "doffs": given.doffs}
+    fields = replace(fields, **{name: value for name, value in numbers.items() if value is not None})
+    # what the file's notes say is about its own baseline
+    return fields if given.baseline is None else replace(fields, baseline=given.baseline, notes=())
 
 
 def _complete(fields: Fields, source: str, file: str) -> Calibration:

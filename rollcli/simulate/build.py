@@ -1,5 +1,6 @@
 """Build the scenes, each drawn from the seeds of a frame, and render their two views and true disparity."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -11,7 +12,6 @@ from rollcli.simulate.materials import Plain, Values
 from rollcli.simulate.relief import LEVEL, Dip
 from rollcli.simulate.road import (
     Carriageway,
-    CrossSection,
     Piece,
     Site,
     cross_section,
@@ -20,8 +20,8 @@ from rollcli.simulate.road import (
 )
 from rollcli.simulate.scene import FAR, Light, Scene, draw, draw_light, draw_offset
 from rollcli.simulate.spec import FrameSpec, Stream
-from rollcli.simulate.surfaces import Course, Ground, Surface
-from rollcli.simulate.views import Camera, PixelRays, bands, expose, first_hits, render_view
+from rollcli.simulate.surfaces import Ground, Surface
+from rollcli.simulate.views import Camera, bands, expose, first_hits, render_view
 
 _HORIZON = 2000.0  # metres: the end of a bare world
 # of dips and bumps
@@ -44,7 +44,8 @@ def build_scene(spec: FrameSpec) -> Scene:
 
 def road_camber(spec: FrameSpec) -> float:
     """Return the curvature across the road below the rig, 1/(camera height); a crown is negative."""
-    return carriageway_of(spec).section.piece(0.0).curvature_at(0.0) * spec.height
+    below = carriageway_of(spec).section.piece(0.0)
+    return float(below.camber / math.hypot(1.0, below.slope) ** 3) * spec.height
 
 
 def carriageway_of(spec: FrameSpec) -> Carriageway:
@@ -155,7 +156,7 @@ def draw_dips(spec: FrameSpec, carriageway: Carriageway) -> tuple[Dip, ...]:
 def _fits(dip: Dip, others: Sequence[Dip], carriageway: Carriageway) -> bool:
     ends = (dip.lateral - 1.3 * dip.across, dip.lateral + 1.3 * dip.across)
     section = carriageway.section
-    one_piece = section.piece(ends[0]) is section.piece(ends[1])
+    one_piece = section.piece(ends[0]) == section.piece(ends[1])
     inside = section.pieces[0].start < ends[0] and ends[1] < section.pieces[-1].end
     apart = all(
         abs(dip.lateral - each.lateral) > 1.2 * (dip.across + each.across)
@@ -182,30 +183,20 @@ def true_heights(scene: Scene, spec: FrameSpec, carriageway: Carriageway, camera
         spec.cross_section, spec.crossfall, 0.0, carriageway.left, carriageway.right, carriageway.course.bend
     )
     ground = np.array([isinstance(each, Ground) for each in scene.surfaces] + [False])
-    rows = [
-        _row_heights(scene, PixelRays.of_rows(camera, part), ground, carriageway.course, section)
-        for part in bands(camera)
-    ]
-    return np.concatenate(rows).reshape(camera.height, camera.width)
-
-
-def _row_heights(
-    scene: Scene, pixels: PixelRays, ground: NDArray[np.bool_], course: Course, section: CrossSection
-) -> Values:
-    depth, owner = first_hits(scene, pixels)
-    seen = ground[owner]
-    points = pixels.rays.origin + np.where(seen, depth, 0) * pixels.rays.direction
-    lateral = course.lateral(points)
-    over, slope = course.elevation(points), np.zeros_like(lateral)
-    for piece in section.pieces:
-        first, last = piece is section.pieces[0], piece is section.pieces[-1]
-        mine = (first | (lateral >= piece.start)) & (last | (lateral < piece.end))
-        over[mine] -= (piece.offset + (piece.slope + piece.camber / 2 * lateral) * lateral)[mine]
-        slope[mine] = (piece.slope + piece.camber * lateral)[mine]
-    normal = -slope * course.across(points[2])
-    normal[1] += 1.0
-    normal[2] -= course.curvature * points[2]
-    return np.where(seen, over / np.linalg.norm(normal, axis=0), np.nan).astype(np.float32)
+    course, heights = carriageway.course, np.full((camera.height, camera.width), np.nan, np.float32)
+    for rows in bands(camera):
+        rays = camera.rays_of(rows)
+        depth, owner = first_hits(scene, rays)
+        seen = ground[owner]
+        points = rays.origin + depth[seen] * rays.direction[:, seen]
+        lateral = course.lateral(points)
+        piece = section.piece(lateral)
+        normal = -piece.slope_at(lateral) * course.across(points[2])
+        normal[1] += 1.0
+        normal[2] -= course.curvature * points[2]
+        over = course.elevation(points) - piece.elevation(lateral)
+        heights[rows.start : rows.stop].reshape(-1)[seen] = over / np.linalg.norm(normal, axis=0)
+    return heights
 
 
 @dataclass(frozen=True)

@@ -33,8 +33,7 @@ from rollcli.run.workers.tasks import run_tasks
 from rollcli.simulate.build import carriageway_of, render_frame, road_camber
 from rollcli.simulate.options import KERBED, MIXED, SimulateOptions
 from rollcli.simulate.relief import lane_points, lane_rolls
-from rollcli.simulate.spec import LEVEL, FrameSpec, draw_specs
-from rollcli.simulate.views import rig_axes
+from rollcli.simulate.spec import FrameSpec, draw_specs
 
 _PARTS = ("left", "right", "disparity")
 _TRUTH = "truth.csv"
@@ -45,7 +44,7 @@ _OURS = re.compile(r"frame_\d{4,}\.png")
 def truth_csv(frames: Iterable[tuple[str, FrameSpec]]) -> bytes:
     """Write the table of known values, one row for each stem and its frame."""
     rows = [{"file": stem, **_truth_of(spec)} for stem, spec in frames]
-    return csv_table([[*rows[0]], *(row.values() for row in rows)])
+    return csv_table([rows[0], *(row.values() for row in rows)])
 
 
 def _truth_of(spec: FrameSpec) -> dict[str, str | int]:
@@ -90,9 +89,9 @@ def lane_rolls_of(spec: FrameSpec) -> tuple[float, float]:
     lane = lane._replace(
         weight=lane.weight * ((lane.lateral > carriageway.left) & (lane.lateral < carriageway.right))
     )
-    height = np.array([carriageway.section.elevation(lateral) for lateral in lane.lateral.tolist()])
+    height = carriageway.section.elevation(lane.lateral)
     if carriageway.relief is not None:
-        height += carriageway.relief.height(lane.lateral, lane.z)
+        height = height + carriageway.relief.height(lane.lateral, lane.z)
     course, camera = carriageway.course, spec.cameras(carriageway.normal)[0]
     right = lane.lateral + lane.z * (course.heading + course.bend / 2 * lane.z)
     points = np.array([right, height + course.curvature / 2 * lane.z**2, lane.z])
@@ -105,13 +104,12 @@ def calibration(spec: FrameSpec) -> bytes:
     Both are 3x4, row by row, in pixels and metres; the fourth number of P1 is -focal * baseline. See Geiger,
     Lenz, Urtasun, "Are we ready for autonomous driving?", CVPR 2012.
     """
-    left = np.zeros((3, 4))
-    left[0, 0] = left[1, 1] = spec.focal
-    left[:2, 2] = spec.centre
-    left[2, 2] = 1.0
-    right = left.copy()
-    right[0, 3] = -spec.focal * spec.baseline
-    lines = (f"P{i}: {' '.join(f'{x:.12e}' for x in view.ravel())}\n" for i, view in enumerate((left, right)))
+    (cx, cy), focal = spec.centre, spec.focal
+    views = (
+        ((focal, 0.0, cx, fourth), (0.0, focal, cy, 0.0), (0.0, 0.0, 1.0, 0.0))
+        for fourth in (0.0, -focal * spec.baseline)
+    )
+    lines = (f"P{i}: {' '.join(f'{x:.12e}' for row in view for x in row)}\n" for i, view in enumerate(views))
     return "".join(lines).encode()
 
 
@@ -161,7 +159,7 @@ class Dataset:
     @property
     def nearest_disparity(self) -> float:
         """The largest disparity of a flat road in any frame, pixels."""
-        return max(_nearest_disparity(spec) for spec in self.specs)
+        return max(map(_nearest_disparity, self.specs))
 
     def calibrations(self) -> dict[Path, bytes]:
         """Make names and contents: calib.txt where all frames share a rig, else one a frame in calib/."""
@@ -233,13 +231,9 @@ def _lost(task: RenderTask, reason: str) -> str:
 
 def _nearest_disparity(spec: FrameSpec) -> float:
     """Return the largest disparity of a flat road, which is linear in the image: largest in one corner."""
-    right, down, ahead = rig_axes(spec.roll, spec.pitch, LEVEL) @ -LEVEL
-    scale = spec.baseline / spec.height
-    return max(
-        scale * float(right * (u - spec.centre[0]) + down * (v - spec.centre[1]) + ahead * spec.focal)
-        for u in (0, spec.size[0] - 1)
-        for v in (0, spec.size[1] - 1)
-    )
+    (width, height), (camera, _) = spec.size, spec.cameras()
+    corners = camera.rays(np.array([0, width - 1] * 2), np.array([0, 0, height - 1, height - 1]))
+    return float((-spec.focal * spec.baseline / spec.height * corners.direction[1]).max())
 
 
 def _png(image: NDArray[np.uint8]) -> bytes:
@@ -251,9 +245,7 @@ def _png(image: NDArray[np.uint8]) -> bytes:
 def _earlier_frames(folder: Path) -> list[Path]:
     """List the files of frame_0001 and so on, where left, right and disparity all have it."""
     folders = [folder / part for part in _PARTS]
-    if not all(each.is_dir() for each in folders):
-        return []
-    names = set.intersection(*({path.name for path in each.iterdir()} for each in folders))
+    names = set.intersection(*({path.name for path in each.glob("frame_*.png")} for each in folders))
     ours = [name for name in names if _OURS.fullmatch(name)]
     calibrations = [(folder / _CALIBRATION / name).with_suffix(".txt") for name in ours]
     heights = [(folder / _HEIGHTS / name).with_suffix(".tif") for name in ours]

@@ -1,8 +1,7 @@
 """The carriageway, with its course, cross-section and surface, and the objects beside it and on it."""
 
-import math
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,17 +37,13 @@ class Piece(NamedTuple):
     camber: float = 0.0
     offset: float = 0.0
 
-    def elevation(self, lateral: float) -> float:
-        """Return the height at a lateral position, metres."""
+    def elevation(self, lateral: Any) -> Any:
+        """Return the height at lateral positions, metres."""
         return self.offset + (self.slope + self.camber / 2 * lateral) * lateral
 
-    def slope_at(self, lateral: float) -> float:
-        """Return the slope at a lateral position; positive where the road rises to the right."""
+    def slope_at(self, lateral: Any) -> Any:
+        """Return the slope at lateral positions; positive where the road rises to the right."""
         return self.slope + self.camber * lateral
-
-    def curvature_at(self, lateral: float) -> float:
-        """Return the second derivative of the height over the plane tangent at a lateral position, 1/m."""
-        return float(self.camber / math.hypot(1.0, self.slope_at(lateral)) ** 3)
 
 
 @dataclass(frozen=True)
@@ -57,13 +52,14 @@ class CrossSection:
 
     pieces: tuple[Piece, ...]
 
-    def piece(self, lateral: float) -> Piece:
-        """Return the piece at a lateral position; beyond the edges the outermost one."""
-        return next((piece for piece in self.pieces if lateral < piece.end), self.pieces[-1])
+    def piece(self, lateral: Any) -> Piece:
+        """Return the piece at a lateral position, or at each of several; beyond the edges the outermost."""
+        at = np.searchsorted([piece.end for piece in self.pieces[:-1]], lateral, side="right")
+        return Piece(*np.array(self.pieces).T[:, at])
 
-    def elevation(self, lateral: float) -> float:
+    def elevation(self, lateral: Any) -> Any:
         """Return the height above the point below the rig, metres; beyond an edge that of the edge."""
-        inside = min(max(lateral, self.pieces[0].start), self.pieces[-1].end)
+        inside = np.clip(lateral, self.pieces[0].start, self.pieces[-1].end)
         return self.piece(inside).elevation(inside)
 
 
@@ -87,35 +83,26 @@ def cross_section(
     """
     middle, half = (left + right) / 2, (right - left) / 2
     start, end = middle - half, middle + half
-    pieces: tuple[Piece, ...]
+    pieces = [Piece(start, end)]
     if shape == "roof":
         rising = Piece(start, middle, crossfall, offset=-2 * crossfall * middle)
-        pieces = rising, Piece(middle, end, -crossfall)
+        pieces = [rising, Piece(middle, end, -crossfall)]
     elif shape in ("crown", "dish"):
         camber = (crossfall if shape == "dish" else -crossfall) / half
-        pieces = (Piece(start, end, -camber * middle, camber),)
+        pieces = [Piece(start, end, -camber * middle, camber)]
     elif shape == "superelevated":
-        pieces = (Piece(start, end, crossfall if bend < 0 else -crossfall),)
-    else:
-        pieces = (Piece(start, end),)
+        pieces = [Piece(start, end, crossfall if bend < 0 else -crossfall)]
     if gutter:
-        pieces = _add_gutters(pieces, gutter)
-    below_rig = CrossSection(pieces).elevation(0.0)
+        inner, outer = start + GUTTER_WIDTH, end - GUTTER_WIDTH
+        gutters = (
+            _straight(start, inner, inner, pieces[0], gutter),
+            _straight(outer, end, outer, pieces[-1], -gutter),
+        )
+        pieces[0] = pieces[0]._replace(start=inner)
+        pieces[-1] = pieces[-1]._replace(end=outer)
+        pieces = [gutters[0], *pieces, gutters[1]]
+    below_rig = CrossSection(tuple(pieces)).elevation(0.0)
     return CrossSection(tuple(piece._replace(offset=piece.offset - below_rig) for piece in pieces))
-
-
-def _add_gutters(pieces: tuple[Piece, ...], gutter: float) -> tuple[Piece, ...]:
-    """Replace the outer ends of the carriageway by straight pieces that fall outward more steeply."""
-    first, last = pieces[0], pieces[-1]
-    left, right = first.start + GUTTER_WIDTH, last.end - GUTTER_WIDTH
-    kept = [*pieces]
-    kept[0] = kept[0]._replace(start=left)
-    kept[-1] = kept[-1]._replace(end=right)
-    return (
-        _straight(first.start, left, left, first, gutter),
-        *kept,
-        _straight(right, last.end, right, last, -gutter),
-    )
 
 
 def _straight(start: float, end: float, at: float, beside: Piece, steeper: float) -> Piece:
@@ -153,7 +140,7 @@ class Carriageway:
 
         On a rough road: of the plane that fits the lane ahead, in place of what lies below the wheels.
         """
-        slope, rising = self.section.piece(0.0).slope_at(0.0), 0.0
+        slope, rising = self.section.piece(0.0).slope, 0.0
         if self.relief is not None:
             _, right, rising = lane_plane(self.relief)
             slope += right
@@ -284,15 +271,9 @@ def vehicle(
     if z > _FAR:
         shapes = shapes[:_SILHOUETTE]
     parts = tuple(_extrude(shape, tall, first_material + shape.material) for shape in shapes)
-    corners = np.array([point for shape in shapes for point in shape.outline])
     half_width = max(shape.half_width + abs(shape.centre) for shape in shapes)
-    extent = np.array(
-        [
-            [-half_width, half_width],
-            [0.0, tall * corners[:, 1].max()],
-            [corners[:, 0].min(), corners[:, 0].max()],
-        ]
-    )
+    ahead, up = np.array([point for shape in shapes for point in shape.outline]).T
+    extent = np.array([[-half_width, half_width], [0.0, tall * up.max()], [ahead.min(), ahead.max()]])
     about = np.array([[-1.0], [1.0], [-1.0]]) if oncoming else 1.0
     frame = about * course.frame(z, ground.slope_at(lateral))
     return Solid(frame, course.point(lateral, z, ground.elevation(lateral)), parts, extent)
@@ -349,14 +330,6 @@ def _extrude(shape: _Shape, tall: float, material: int) -> ConvexPart:
     return ConvexPart(normals / length[:, None], offsets / length, material)
 
 
-def box(half_width: float, height: float, half_length: float, material: int) -> ConvexPart:
-    """Return a box that stands on the origin of its frame."""
-    normals = np.concatenate([np.eye(3), -np.eye(3)])
-    return ConvexPart(
-        normals, np.array([half_width, height, half_length, half_width, 0.0, half_length]), material
-    )
-
-
 _GRASS: Tint = (0.45, 1.0, 0.72)
 _FOREST: Tint = (0.55, 1.0, 0.75)
 
@@ -378,14 +351,21 @@ class Site:
         look = Leaves(self.draw(0.14, 0.24), self.draw(0.15, 0.3), tint=_GRASS, offset=draw_offset(self.rng))
         return self.scene.material(look)
 
+    def add_leaves(self, low: float, high: float, tint: Tint, contrast: float, scale: float = 1.0) -> int:
+        """Add the material of foliage of an albedo between two; return its index."""
+        look = Leaves(self.draw(low, high), contrast, scale, tint=tint, offset=draw_offset(self.rng))
+        return self.scene.material(look)
+
     def add_slope(
         self, side: int, start: float, end: float, level: float, slope: float, material: int
     ) -> None:
         """Add ground from `start` outward to `end`: from elevation `level` on with an outward `slope`."""
         signed = side * slope
         edges = (start, end) if side > 0 else (end, start)
-        ground = Ground(self.road.course, edges, (material,), FAR, signed, level - signed * start)
-        self.scene.surfaces.append(replace(ground, relief=self.road.relief))
+        shape = (signed, level - signed * start)
+        self.scene.surfaces.append(
+            Ground(self.road.course, edges, (material,), FAR, *shape, relief=self.road.relief)
+        )
 
     def add_sidewalk(self, side: int, edge: float, beyond: int | None = None) -> tuple[float, float]:
         """Add a kerb, a sidewalk and, of the material `beyond`, level ground behind it.
@@ -404,44 +384,39 @@ class Site:
             materials.append(beyond)
         foot = base + (self.road.relief.lowest if self.road.relief else 0.0)
         kerb = Wall(self.road.course, edge, foot, np.array([-50.0, FAR]), np.array([level]), stone)
-        strips = Ground(self.road.course, tuple(ends[::side]), tuple(materials[::side]), FAR, offset=level)
-        strips = replace(strips, relief=self.road.relief)
+        edges, course, relief = tuple(ends[::side]), self.road.course, self.road.relief
+        strips = Ground(course, edges, tuple(materials[::side]), FAR, offset=level, relief=relief)
         self.scene.surfaces += [kerb, strips]
         return level, edge + side * width
 
     def add_houses(self, side: int, front: float, base: float) -> None:
         """Add a row of house fronts with gaps, and the bodies of the houses behind them."""
-        n, course = 24, self.road.course
-        widths, storeys = self.rng.uniform(7, 16, n), self.rng.uniform(2.8, 3.4, n)
+        n, course, rng = 24, self.road.course, self.rng
+        widths, storeys = rng.uniform(7, 16, n), rng.uniform(2.8, 3.4, n)
         edges = -20 + np.concatenate([[0.0], np.cumsum(widths)])
-        heights = storeys * self.rng.integers(2, 5, n) + self.rng.uniform(0.3, 0.8, n)
-        heights[self.rng.random(n) < 0.1] = 0.0
-        levels, bays = self.rng.uniform(0.25, 0.65, n), self.rng.uniform(2.2, 3.6, n)
-        tints = np.stack([self.rng.uniform(0.6, 1.0, n), self.rng.uniform(0.85, 1.0, n), np.ones(n)], axis=1)
+        heights = storeys * rng.integers(2, 5, n) + rng.uniform(0.3, 0.8, n)
+        heights[rng.random(n) < 0.1] = 0.0
+        levels, bays = rng.uniform(0.25, 0.65, n), rng.uniform(2.2, 3.6, n)
+        tints = np.stack([rng.uniform(0.6, 1.0, n), rng.uniform(0.85, 1.0, n), np.ones(n)], axis=1)
         looks = (x.astype(np.float32) for x in (edges, levels, tints, storeys, bays))
-        look = Facade(draw_offset(self.rng), *looks)
-        self.scene.surfaces.append(
-            Wall(course, front, base, edges, base + heights, self.scene.material(look))
-        )
+        fronts = self.scene.material(Facade(draw_offset(rng), *looks))
+        self.scene.surfaces.append(Wall(course, front, base, edges, base + heights, fronts))
         before = np.concatenate([[0.0], heights[:-1]])
         # the only part of a body that is visible from the street is the gable above the house before it
         for i in np.flatnonzero((heights > before + 0.3) & (edges[:-1] > 3) & (edges[:-1] < 120)):
-            tint = tuple(float(x) for x in tints[i])
-            plaster = self.scene.material(Plain(float(0.9 * levels[i]), tint=(tint[0], tint[1], tint[2])))
+            blue, green, red = tints[i].tolist()
+            plaster = self.scene.material(Plain(float(0.9 * levels[i]), tint=(blue, green, red)))
             height, half, depth = float(heights[i]), float(widths[i] / 2), 5.0
             extent = np.array([[-depth, depth], [0.0, height], [-half, half]])
             middle = float(edges[i] + half)
             # set back: the body is straight, and must stay behind a front that follows the bend
             place = course.point(front + side * (depth + 0.25), middle, base)
-            body = box(depth, height, half, plaster)
+            body = _extrude(_Shape(_rectangle(-half, half, 0.0, height), plaster, depth), 1.0, plaster)
             self.scene.surfaces.append(Solid(course.frame(middle), place, (body,), extent))
 
     def add_hedge(self, lateral: float, base: float) -> None:
         """Add a clipped hedge along the road."""
-        tint = (0.42, 1.0, 0.62)
-        material = self.scene.material(
-            Leaves(self.draw(0.08, 0.16), 0.4, tint=tint, offset=draw_offset(self.rng))
-        )
+        material = self.add_leaves(0.08, 0.16, (0.42, 1.0, 0.62), 0.4)
         edges = np.arange(-20.0, 120.0, 1.0, dtype=np.float64)
         tops = base + self.draw(0.9, 1.8) + self.rng.uniform(-0.08, 0.08, len(edges) - 1)
         self.scene.surfaces.append(Wall(self.road.course, lateral, base, edges, tops, material))
@@ -450,18 +425,15 @@ class Site:
         """Add lamp posts or delineators, evenly spaced."""
         metal = self.scene.material(Plain(self.draw(0.2, 0.6), 0.05, 0.05))
         gap = self.draw(18, 35)
-        for z in np.arange(self.draw(6, gap), 90, gap):
-            self.scene.surfaces.append(
-                Post(self.road.course.point(lateral, float(z), level), radius, height, metal)
-            )
+        feet = [
+            self.road.course.point(lateral, z, level) for z in np.arange(self.draw(6, gap), 90, gap).tolist()
+        ]
+        self.scene.surfaces += [Post(foot, radius, height, metal) for foot in feet]
 
     def add_trees(self, near: float, outer: float, level: float) -> None:
         """Add trees between two lateral positions, each a trunk and two crowns that overlap."""
         bark = self.scene.material(Plain(0.12, 0.3, 0.2, tint=(0.75, 0.9, 1.0)))
-        tint = (0.42, 1.0, self.draw(0.55, 0.8))
-        leaves = self.scene.material(
-            Leaves(self.draw(0.10, 0.2), 0.4, tint=tint, offset=draw_offset(self.rng))
-        )
+        leaves = self.add_leaves(tint=(0.42, 1.0, self.draw(0.55, 0.8)), low=0.10, high=0.2, contrast=0.4)
         z = self.draw(10, 25)
         while z < 90:
             lateral = near + (outer - near) * float(self.rng.random())
@@ -478,32 +450,29 @@ class Site:
 
     def add_cars(self) -> None:
         """Add vehicles: one ahead, one oncoming and parked ones, each with a probability."""
+        rng, road = self.rng, self.road
         places: list[tuple[float, float]] = []
-        if self.rng.random() < 0.5:
-            places.append((self.road.shift + self.rng.normal(0, 0.2), self.rng.uniform(9, 40)))
-        if self.rng.random() < 0.5 and not self.road.single:
-            places.append(
-                (self.road.shift - self.road.lane + self.rng.normal(0, 0.2), self.rng.uniform(9, 60))
-            )
-        if self.road.parking:
-            for edge in (self.road.left + 1.15, self.road.right - 1.15):
-                z = self.rng.uniform(6, 12)
-                while z < 70:
-                    if self.rng.random() < 0.6:
-                        places.append((edge + self.rng.normal(0, 0.05), z))
-                    z += self.rng.uniform(8.2, 10)
-        first, middle = len(self.scene.materials), self.road.shift - self.road.lane / 2
-        self.scene.materials += car_materials(draw_offset(self.rng))
-        course, section = self.road.course, self.road.section
+        if rng.random() < 0.5:
+            places.append((road.shift + rng.normal(0, 0.2), rng.uniform(9, 40)))
+        if rng.random() < 0.5 and not road.single:
+            places.append((road.shift - road.lane + rng.normal(0, 0.2), rng.uniform(9, 60)))
+        for edge in (road.left + 1.15, road.right - 1.15) if road.parking else ():
+            z = rng.uniform(6, 12)
+            while z < 70:
+                if rng.random() < 0.6:
+                    places.append((edge + rng.normal(0, 0.05), z))
+                z += rng.uniform(8.2, 10)
+        first, middle = len(self.scene.materials), road.shift - road.lane / 2
+        self.scene.materials += car_materials(draw_offset(rng))
         self.scene.cars += [
-            vehicle(self.rng, course, section.piece(x), float(x), float(z), first, x < middle)
+            vehicle(rng, road.course, road.section.piece(x), float(x), float(z), first, x < middle)
             for x, z in places
         ]
         self.scene.surfaces += self.scene.cars
 
     def add_backdrop(self) -> None:
         """Add a line of trees where the ground ends."""
-        look = Leaves(self.draw(0.10, 0.2), scale=0.15, tint=_FOREST, offset=draw_offset(self.rng))
+        material = self.add_leaves(0.10, 0.2, _FOREST, 0.35, scale=0.15)
         steps = self.rng.normal(0, 1.2, 400)
         skyline = 9 + np.convolve(steps, np.ones(9) / 3, mode="same") + self.rng.uniform(-1, 1, 400)
-        self.scene.surfaces.append(Backdrop(self.road.course, FAR, -30.0, skyline, self.scene.material(look)))
+        self.scene.surfaces.append(Backdrop(self.road.course, FAR, -30.0, skyline, material))

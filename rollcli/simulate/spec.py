@@ -169,7 +169,5 @@ def _drawn(spec: FrameSpec, options: SimulateOptions) -> FrameSpec:
 
 def _offset(spec: FrameSpec, right: float, down: float) -> FrameSpec:
     """Return the frame with its principal point moved."""
-    if not (right or down):
-        return spec
     column, row = spec.centre
     return replace(spec, principal_point=(column + right, row + down))

@@ -113,11 +113,11 @@ class Ground(Surface):
     relief: Relief | None = None
 
     def intersect(self, origin: Array, direction: Array) -> Array:
-        (ox, _, oz), (rx, _, rz) = origin, direction
         t = self._first_hit(origin, direction)
-        z = oz + t * rz
-        lateral = ox + t * rx - z * (self.course.heading + self.course.bend / 2 * z)
-        inside = (lateral >= self.edges[0] - _SEAM) & (lateral < self.edges[-1] + _SEAM) & (z < self.far)
+        points = origin + t * direction
+        lateral = self.course.lateral(points)
+        inside = (lateral >= self.edges[0] - _SEAM) & (lateral < self.edges[-1] + _SEAM)
+        inside &= points[2] < self.far
         return np.where(inside, t, np.inf)
 
     def _first_hit(self, origin: Array, direction: Array) -> Array:
@@ -202,15 +202,15 @@ class Wall(Surface):
     material: int
 
     def intersect(self, origin: Array, direction: Array) -> Array:
-        (ox, oy, oz), (rx, ry, rz) = origin, direction
+        (ox, _, oz), (rx, _, rz) = origin, direction
         heading, bend = self.course.heading, self.course.bend
         c = ox - oz * (heading + bend / 2 * oz) - self.lateral
         side = np.where(c < 0, -1.0, 1.0)  # first_root needs the origin on the positive side
         b = rx - rz * (heading + bend * oz)
         t = first_root(-side * bend / 2 * rz * rz, side * b, side * c)
-        z = oz + t * rz
-        elevation = oy + t * ry - self.course.curvature / 2 * z * z
-        section = np.searchsorted(self.edges, z) - 1
+        points = origin + t * direction
+        elevation = self.course.elevation(points)
+        section = np.searchsorted(self.edges, points[2]) - 1
         inside = (section >= 0) & (section < len(self.tops))
         top = self.tops[np.where(inside, section, 0)]
         return np.where(inside & (elevation >= self.base) & (elevation < top), t, np.inf)

@@ -13,20 +13,6 @@ from rollcli.simulate.vectors import Array, Vectors, dot, groups
 
 
 @dataclass(frozen=True)
-class Rays:
-    """N rays; `direction` has length one along the optical axis, so a ray's parameter is its depth.
-
-    `origin` and `direction` are (3, 1) and (3, N), metres; `across` and `down` (3,) are the steps of
-    `direction` for one pixel to the right and one pixel down.
-    """
-
-    origin: Array
-    direction: Array
-    across: Array
-    down: Array
-
-
-@dataclass(frozen=True)
 class Camera:
     """Intrinsics, orientation and place of one camera.
 
@@ -51,12 +37,21 @@ class Camera:
     axes: Array
     position: Array
 
-    def rays(self, u: NDArray[Any], v: NDArray[Any]) -> Rays:
+    @property
+    def steps(self) -> Array:
+        """Return the steps of a ray's direction for one pixel to the right and one pixel down, (2, 3)."""
+        return np.asarray(self.axes[:2] / self.focal)
+
+    def rays(self, u: NDArray[Any], v: NDArray[Any]) -> "Rays":
         """Return the rays through positions `u`, `v` (N,), pixels from the centre of the top-left pixel."""
-        right, down, forward = self.axes / np.array([[self.focal], [self.focal], [1.0]])
+        right, down = self.steps[..., None]
         x, y = u - self.centre[0], v - self.centre[1]
-        direction = forward[:, None] + right[:, None] * x + down[:, None] * y
-        return Rays(self.position[:, None], direction, right, down)
+        return Rays(self, u, v, self.axes[2][:, None] + right * x + down * y)
+
+    def rays_of(self, rows: range) -> "Rays":
+        """Return the rays through the centres of all pixels of these rows, row by row."""
+        v, u = np.indices((len(rows), self.width), float).reshape(2, -1)
+        return self.rays(u, v + rows.start)
 
     def project(self, points: Array) -> tuple[Array, Array, Array]:
         """Return columns, rows (pixels) and depths (metres) of world points (3, N); depths have a sign."""
@@ -111,25 +106,21 @@ def expose(
 
 
 @dataclass(frozen=True)
-class PixelRays:
-    """Positions u, v (N,), pixels, and their rays."""
+class Rays:
+    """The rays of a camera through positions u, v (N,), pixels.
+
+    `direction` (3, N) has length one along the optical axis, so that a ray's parameter is its depth, metres.
+    """
 
     camera: Camera
     u: Array
     v: Array
-    rays: Rays
+    direction: Array
 
-    @staticmethod
-    def of_rows(camera: Camera, rows: range) -> "PixelRays":
-        """Take the centres of all pixels of these rows, row by row."""
-        v, u = np.indices((len(rows), camera.width), float).reshape(2, -1)
-        v += rows.start
-        return PixelRays(camera, u, v, camera.rays(u, v))
-
-    @staticmethod
-    def at(camera: Camera, u: Array, v: Array) -> "PixelRays":
-        """Take any positions."""
-        return PixelRays(camera, u, v, camera.rays(u, v))
+    @property
+    def origin(self) -> Array:
+        """Return where all of them begin, (3, 1), metres."""
+        return self.camera.position[:, None]
 
     def window(self, corners: Array | None) -> Indices | None:
         """Return the indices of rays that can hit a box with these corners (3, 8); None: all of them can."""
@@ -164,24 +155,23 @@ class Hits:
     reads: Values
 
 
-def trace(scene: Scene, pixels: PixelRays) -> Hits:
+def trace(scene: Scene, rays: Rays) -> Hits:
     """Trace the rays, and evaluate the surfaces where they are hit."""
-    depth, owner = first_hits(scene, pixels)
+    depth, owner = first_hits(scene, rays)
     hits = Hits(depth, owner, np.full(len(depth), NONE, np.int16), np.ones((8, len(depth)), np.float32))
-    direction = pixels.rays.direction.astype(np.float32)
+    direction = rays.direction.astype(np.float32)
     for k, at in groups(owner, len(scene.surfaces)):
-        _read(scene, scene.surfaces[k], pixels.rays, direction.take(at, axis=1), at, hits)
-    _dim_below_cars(scene, pixels, hits)
+        _read(scene, scene.surfaces[k], rays, direction.take(at, axis=1), at, hits)
+    _dim_below_cars(scene, rays, hits)
     return hits
 
 
-def first_hits(scene: Scene, pixels: PixelRays) -> tuple[Array, NDArray[np.int16]]:
+def first_hits(scene: Scene, rays: Rays) -> tuple[Array, NDArray[np.int16]]:
     """Return the depth (inf for sky) and the index of the surface (-1 for sky) that each ray hits first."""
-    rays = pixels.rays
-    depth = np.full(len(pixels.u), np.inf)
-    owner = np.full(len(pixels.u), -1, np.int16)
+    depth = np.full(len(rays.u), np.inf)
+    owner = np.full(len(rays.u), -1, np.int16)
     for k, surface in enumerate(scene.surfaces):
-        window = pixels.window(surface.bounds())
+        window = rays.window(surface.bounds())
         at = slice(None) if window is None else window
         t = surface.intersect(rays.origin, rays.direction[:, at])
         nearer = t < depth[at]
@@ -210,13 +200,13 @@ def _read(scene: Scene, surface: Surface, rays: Rays, direction: Values, at: Ind
         hits.reads[row][at] = values
 
 
-def _dim_below_cars(scene: Scene, pixels: PixelRays, hits: Hits) -> None:
+def _dim_below_cars(scene: Scene, rays: Rays, hits: Hits) -> None:
     """Reduce the sky's light on the ground near and below cars."""
     ground = np.array([isinstance(s, Ground) for s in scene.surfaces] + [False])[hits.surface]
     for car in scene.cars:
-        window = pixels.window(car.bounds(margin=1.0))
+        window = rays.window(car.bounds(margin=1.0))
         near = np.flatnonzero(ground) if window is None else window[ground[window]]
-        points = pixels.rays.origin + hits.depth[near] * pixels.rays.direction[:, near]
+        points = rays.origin + hits.depth[near] * rays.direction[:, near]
         hits.reads[AIR][near] *= air_below(points, car)
 
 
@@ -226,7 +216,7 @@ def _footprint(sample: SurfaceSample, direction: Vectors, depth: Vectors, rays: 
     scale = depth / np.where(np.abs(per_ray) < 1e-9, 1e-9, per_ray)
     ray_p, ray_q = dot(sample.grad_p, direction), dot(sample.grad_q, direction)
     slopes = []
-    for step in (rays.across.astype(np.float32), rays.down.astype(np.float32)):
+    for step in rays.camera.steps.astype(np.float32):
         slide = dot(sample.normal, step) * scale
         slopes += [
             dot(sample.grad_p, step) * depth - slide * ray_p,
@@ -304,25 +294,25 @@ def _render_band(scene: Scene, camera: Camera, rows: range) -> View:
     """Render these rows of a camera's image."""
     # one more row above and below: an edge is where a pixel differs from its neighbour
     around = range(max(rows.start - 1, 0), min(rows.stop + 1, camera.height))
-    pixels = PixelRays.of_rows(camera, around)
-    hits = trace(scene, pixels)
+    rays = camera.rays_of(around)
+    hits = trace(scene, rays)
     edge = np.flatnonzero(_edges(hits, camera.width))
-    u = (pixels.u[edge] + _SUBPIXELS[:, :1]).ravel()
-    v = (pixels.v[edge] + _SUBPIXELS[:, 1:]).ravel()
-    between = PixelRays.at(camera, u, v)
+    u = (rays.u[edge] + _SUBPIXELS[:, :1]).ravel()
+    v = (rays.v[edge] + _SUBPIXELS[:, 1:]).ravel()
+    between = camera.rays(u, v)
     finer = trace(scene, between)
     light = shade(
         scene,
-        np.concatenate([pixels.rays.direction, between.rays.direction], axis=1),
+        np.concatenate([rays.direction, between.direction], axis=1),
         np.concatenate([hits.material, finer.material]),
         np.concatenate([hits.reads, finer.reads], axis=1),
     )
-    light[edge] = light[len(pixels.u) :].reshape(4, -1, 3).mean(axis=0)
+    light[edge] = light[len(rays.u) :].reshape(4, -1, 3).mean(axis=0)
     shape, inner = (len(around), camera.width), slice(rows.start - around.start, rows.stop - around.start)
     return View(
         hits.depth.reshape(shape)[inner],
         hits.material.reshape(shape)[inner],
-        light[: len(pixels.u)].reshape(*shape, 3)[inner],
+        light[: len(rays.u)].reshape(*shape, 3)[inner],
     )
 
 
@@ -331,10 +321,6 @@ def _edges(hits: Hits, width: int) -> NDArray[np.bool_]:
     shadow = hits.reads[SUN] == 0
     kind = (hits.surface.astype(np.int32) << 17) + (hits.material.astype(np.int32) << 1) + shadow
     kind = kind.reshape(-1, width)
-    edge = np.zeros(kind.shape, bool)
-    beside, below = np.diff(kind, axis=1) != 0, np.diff(kind, axis=0) != 0
-    edge[:, 1:] |= beside
-    edge[:, :-1] |= beside
-    edge[1:] |= below
-    edge[:-1] |= below
-    return edge.ravel()
+    padded = np.pad(kind, 1, mode="edge")
+    beside = (padded[1:-1, 2:] != kind) | (padded[1:-1, :-2] != kind)
+    return np.asarray(beside | (padded[2:, 1:-1] != kind) | (padded[:-2, 1:-1] != kind)).ravel()

@@ -50,7 +50,7 @@ def measure(width: int, height: int) -> dict[str, float]:
     """Every figure of one size, milliseconds."""
     disparity = road(width, height)
     energy = Energy.of(map_moments(disparity), float(disparity.max()))
-    textbook = Textbook.of(disparity)
+    textbook = Textbook(disparity)
     figures = {
         "np.sum of the map": best(lambda: disparity.sum()),
         "moments of the map": best(lambda: map_moments(disparity)),

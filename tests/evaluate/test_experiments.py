@@ -19,7 +19,7 @@ from rollcli.evaluate.experiments import (
     rotate_nearest,
     time_solvers,
 )
-from rollcli.evaluate.paper_page import DELTAS_DEG, all_tables
+from rollcli.evaluate.paper_page import DELTAS_DEG, all_tables, column
 from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of
 
 TURNS = [math.radians(turn) for turn in (-10, 0, 15)]
@@ -57,8 +57,8 @@ def test_a_method_without_an_angle_is_counted_and_leaves_the_others_alone():
     assert found.method_errors["areas"] == (None,)
     assert found.method_errors["line"][0] is not None
     methods = all_tables([found], [], [time_solvers(upward)])["methods_accuracy"]
-    assert methods.where(method="areas").column("no_angle") == [1]
-    assert methods.where(method="areas").column("mean_deg") == [None]
+    assert column(methods, "no_angle", method="areas") == [1]
+    assert column(methods, "mean_deg", method="areas") == [None]
 
 
 def test_a_map_without_an_angle_is_refused():
@@ -73,15 +73,16 @@ def made_times(seconds):
 def test_runs_that_stopped_short_are_left_out_of_the_mean_and_counted(found):
     short = replace(found, sweep=tuple((None, *counts[1:]) for counts in found.sweep))
     slower = replace(found, sweep=tuple(tuple(count and count + 4 for count in each) for each in found.sweep))
-    table = all_tables([found, slower], [], [made_times(1)])["fig3_lambda0"].where(lambda0=26.0)
+    table = all_tables([found, slower], [], [made_times(1)])["fig3_lambda0"]
     for name, more in (("mean", 2), ("min", 0), ("max", 4)):
-        assert table.column(name) == [counts[25] + more for counts in found.sweep]
+        assert column(table, name, lambda0=26.0) == [counts[25] + more for counts in found.sweep]
     table = all_tables([found, short], [], [made_times(1)])["fig3_lambda0"]
-    rates = table.where(delta_deg=DELTAS_DEG[0]).column("lambda0")
-    assert rates == list(range(1, 101))  # the whole numbers that the command's help names
-    row = table.where(lambda0=1.0, delta_deg=0.0001)
-    assert row.column("short") == [1 + (found.sweep[-1][0] is None)]
-    assert row.column("mean") == [found.sweep[-1][0]]
+    assert column(table, "lambda0", delta_deg=DELTAS_DEG[0]) == list(
+        range(1, 101)
+    )  # the whole numbers that the command's help names
+    (row,) = (each for each in table if (each["lambda0"], each["delta_deg"]) == (1.0, 0.0001))
+    assert row["short"] == 1 + (found.sweep[-1][0] is None)
+    assert row["mean"] == found.sweep[-1][0]
 
 
 def test_a_time_is_that_of_the_fastest_run():

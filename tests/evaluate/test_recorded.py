@@ -27,7 +27,7 @@ from rollcli.evaluate.experiments import (
     rotate_nearest,
 )
 from rollcli.evaluate.options import ExperimentOptions, PaperOptions
-from rollcli.evaluate.paper_page import all_tables, paper_page
+from rollcli.evaluate.paper_page import all_tables, paper_page, table_csv
 from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.files.results import Row
 from rollcli.run.options import EncodingOptions, InputOptions, RegionOptions, RunningOptions
@@ -60,7 +60,7 @@ def _tables():
 
 
 def _textbook():
-    textbook = Textbook.of(bent_road(5, width=40, height=30, noise=0.3, seed=4))
+    textbook = Textbook(bent_road(5, width=40, height=30, noise=0.3, seed=4))
     return [
         [textbook.golden_section(delta), textbook.gradient_descent(delta, lambda0=26.0)]
         for delta in (1e-2, 1e-4, 1e-6)
@@ -156,7 +156,7 @@ def _tables_without_angles():
     stopped = tuple(tuple(count if k % 2 else None for k, count in enumerate(each)) for each in found.sweep)
     errors = dict.fromkeys(METHODS, (None,) * 3)
     found = dataclasses.replace(found, sweep=stopped, method_errors=errors)
-    return {name: table.csv().decode() for name, table in all_tables([found], [], [_times(0.1)]).items()}
+    return {name: table_csv(table).decode() for name, table in all_tables([found], [], [_times(0.1)]).items()}
 
 
 TRUTHS = (
@@ -198,7 +198,7 @@ def _unlike(form):
 
 CASES = {
     "findings": _found,
-    "tables": lambda: {name: table.rows for name, table in _tables().items()},
+    "tables": lambda: {name: [list(row.values()) for row in table] for name, table in _tables().items()},
     "figures": lambda: {name: drawn(each) for name, each in _figures(_tables()).items()},
     "textbook": _textbook,
     "turned": lambda: [

@@ -311,7 +311,7 @@ def _page(name, *, run=None, count=0, taken=NO_PICTURES, **options):
     pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
     content = pytest.importorskip("rollcli.report.content", reason="jinja2, of the extra report, is not here")
     rows, found = RESULTS[name]()
-    shown = [(each, taken) for each in choose(rows, count, [4, 8])]
+    shown = [(each, taken) for each in choose(rows, count, [4, 8]).items()]
     given = ReportOptions(("no/rolls.csv", "s3://key@maps/b.csv?x=1"), "page.html", **options)
     page = content.report_page(Result(rows, run), given, shown, found, all_charts(rows, found)).decode()
     text = _STILL.sub("", _SCRIPTS.sub("", page)).replace(__version__, "VERSION")
@@ -341,7 +341,7 @@ PAGES = {
 
 def _chosen(count, jumps=(), rows=None):
     rows = rows or _long()[0]
-    return [[each.place, each.reason] for each in choose(rows, count, jumps)]
+    return [*choose(rows, count, jumps).items()]
 
 
 @contextlib.contextmanager

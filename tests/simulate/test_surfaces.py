@@ -10,7 +10,7 @@ from rollcli.simulate.road import Piece, vehicle
 from rollcli.simulate.scene import Post
 from rollcli.simulate.spec import FrameSpec
 from rollcli.simulate.surfaces import Backdrop, Course, Ground, Wall
-from rollcli.simulate.views import PixelRays, first_hits
+from rollcli.simulate.views import first_hits
 
 COURSE = Course(heading=0.03, bend=1 / 300, curvature=0.001)
 ORIGIN = np.array([[0.3], [1.6], [0.1]])
@@ -94,16 +94,16 @@ SPEC = FrameSpec("street", math.radians(8), math.radians(3), seed=11, size=(160,
 def every_pixel(spec):
     scene = build_scene(spec)
     camera = spec.cameras(scene.normal)[0]
-    return scene, PixelRays.of_rows(camera, range(spec.size[1]))
+    return scene, camera.rays_of(range(spec.size[1]))
 
 
 @pytest.mark.parametrize("seed", [3, 11, 19])
 @pytest.mark.parametrize("scene", ["open", "street", "verge"])
 def test_each_ray_meets_the_nearest_of_all_surfaces(scene, seed):
-    scene, pixels = every_pixel(FrameSpec(scene, 0.14, 0.05, seed=seed, size=(160, 120), focal=93.0))
-    depth, surface = first_hits(scene, pixels)
+    scene, rays = every_pixel(FrameSpec(scene, 0.14, 0.05, seed=seed, size=(160, 120), focal=93.0))
+    depth, surface = first_hits(scene, rays)
     # without the boxes around objects, which spare rays that pass by
-    every = np.array([s.intersect(pixels.rays.origin, pixels.rays.direction) for s in scene.surfaces])
+    every = np.array([s.intersect(rays.origin, rays.direction) for s in scene.surfaces])
     nearest = every.min(axis=0)
     assert np.array_equal(depth, nearest)
     assert np.array_equal(surface, np.where(np.isfinite(nearest), every.argmin(axis=0), -1))
@@ -115,10 +115,10 @@ def box(low, high):
 
 
 def test_a_box_around_the_camera_may_be_met_by_any_ray_and_one_behind_it_by_none():
-    _, pixels = every_pixel(SPEC)
-    assert pixels.window(None) is None
-    assert pixels.window(box((-1, 0, -2), (1, 3, 2))) is None
-    assert pixels.window(box((-1, 0, 0.05), (1, 3, 9))) is None
-    assert len(pixels.window(box((-1, 0, -9), (1, 3, -4)))) == 0
-    ahead = pixels.window(box((-1, 0, 4), (1, 2, 9)))
-    assert 0 < len(ahead) < len(pixels.u)
+    _, rays = every_pixel(SPEC)
+    assert rays.window(None) is None
+    assert rays.window(box((-1, 0, -2), (1, 3, 2))) is None
+    assert rays.window(box((-1, 0, 0.05), (1, 3, 9))) is None
+    assert len(rays.window(box((-1, 0, -9), (1, 3, -4)))) == 0
+    ahead = rays.window(box((-1, 0, 4), (1, 2, 9)))
+    assert 0 < len(ahead) < len(rays.u)

@@ -188,81 +188,34 @@ class _Header(NamedTuple):
     filtering: int
     interlace: int
 
-    @property
-    def pixel_bytes(self) -> int:
-        """What OpenCV takes for a pixel; a palette's colours are spelled out, with their opacity."""
-        return 4 if self.colour == _PALETTE else _CHANNELS[self.colour] * (2 if self.depth == 16 else 1)
-
-    @property
-    def row_bytes(self) -> int:
-        """The bytes of a row, after its filter byte."""
-        return (self.width * self.depth * _CHANNELS[self.colour] + 7) // 8
-
-
-class _Whole(NamedTuple):
-    """What decides the pixels: the header, the bodies of palette and transparency, the chunks of the data.
-
-    `text` is what rollcli wrote beside them.
-    """
-
-    header: _Header
-    palette: bytes
-    transparent: bytes
-    image: list[memoryview]
-    text: str
-
-    @property
-    def packed_size(self) -> int:
-        """Bytes of the pixel data."""
-        return sum(len(chunk) - 12 for chunk in self.image)
-
-    @property
-    def packed(self) -> bytes:
-        """The pixel data: a zlib stream."""
-        return b"".join(chunk[8:-4] for chunk in self.image)
-
-    def file(self, name: str) -> bytes:
-        """Return a file of nothing else."""
-        start: list[bytes | memoryview] = [SIGNATURE, _chunk(b"IHDR", struct.pack(">IIBBBBB", *self.header))]
-        if self.header.colour == _PALETTE:
-            start.append(_chunk(b"PLTE", _full_palette(self.header, self.palette, name)))
-            if self.transparent:
-                start.append(_chunk(b"tRNS", self.transparent[: 2**self.header.depth]))
-        return b"".join([*start, *self.image, _chunk(b"IEND", b"")])
-
 
 def decode_png(data: bytes, name: str) -> Stored:
     """Return the numbers of a single-channel PNG as they are stored, uint8 or uint16, and rollcli's text.
 
     A palette of greys stands for its greys; fully transparent pixels hold no data and become 0.
     """
-    whole = _checked(data, name)
-    return Stored(_grey_values(whole, name), "png", text=whole.text)
-
-
-def _grey_values(whole: "_Whole", name: str) -> NDArray[Any]:
-    header, transparent = whole.header, whole.transparent
-    pixels = _decoded(whole, name, cv2.IMREAD_UNCHANGED)
+    header, bodies, pixels = _decoded(data, name, cv2.IMREAD_UNCHANGED)
+    transparent = bodies.get(b"tRNS", b"")
     if header.colour == _GREY:
         if header.depth < 8:  # which OpenCV spreads over 0..255
             pixels //= 255 // (2**header.depth - 1)
         if transparent:
             pixels[pixels == int.from_bytes(transparent, "big")] = 0
-        return pixels
-    grey: NDArray[Any] = np.ascontiguousarray(pixels[..., 0])
-    if header.colour == _PALETTE and not bool((pixels[..., :3] == grey[..., None]).all()):
-        raise InputError(f"{name}: is a colour image (a palette); {COLOUR_REMEDY}")
-    if header.colour in (_GREY_ALPHA, _PALETTE):
+    elif header.colour in (_COLOUR, _COLOUR_ALPHA):
+        raise InputError(f"{name}: is a colour image ({_CHANNELS[header.colour]} channels); {COLOUR_REMEDY}")
+    else:
+        grey = np.ascontiguousarray(pixels[..., 0])
+        if header.colour == _PALETTE and (pixels[..., :3] != grey[..., None]).any():
+            raise InputError(f"{name}: is a colour image (a palette); {COLOUR_REMEDY}")
         if header.colour == _GREY_ALPHA or transparent:
             grey[pixels[..., -1] == 0] = 0
-        return grey
-    what = f"{_CHANNELS[header.colour]} channels"
-    raise InputError(f"{name}: is a colour image ({what}); {COLOUR_REMEDY}")
+        pixels = grey
+    return Stored(pixels, "png", text=bodies.get(_TEXT_KEY, b"").decode("latin-1"))
 
 
 def picture(data: bytes, name: str, *, mask: bool = False) -> NDArray[Any]:
     """Return the pixels of a camera image or mask: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
-    return _decoded(_checked(data, name, mask), name, PICTURE_FLAGS)
+    return _decoded(data, name, PICTURE_FLAGS, mask=mask)[-1]
 
 
 def encode_png(values: NDArray[Any], text: str = "") -> bytes:
@@ -276,23 +229,48 @@ def encode_png(values: NDArray[Any], text: str = "") -> bytes:
     return file[:first] + _chunk(b"tEXt", _TEXT_KEY + text.encode("ascii")) + file[first:]
 
 
-def _decoded(whole: _Whole, name: str, flags: int) -> NDArray[Any]:
-    header = whole.header
-    if header.colour == _GREY and header.depth >= 8 and not header.interlace:
-        fast = decode_grey(whole.packed, header.width, header.height, header.depth)
+def _decoded(
+    data: bytes, name: str, flags: int, *, mask: bool = False
+) -> tuple[_Header, dict[bytes, bytes], NDArray[Any]]:
+    """Return header, further bodies by their kinds, and pixels; InputError if the file is not whole."""
+    header, bodies, image = _chunks(data, name)
+    width, height, depth, colour = header[:4]
+    packed = b"".join(chunk[8:-4] for chunk in image)
+    # what OpenCV takes for a pixel; a palette's colours are spelled out, with their opacity
+    pixel_bytes = 4 if colour == _PALETTE else _CHANNELS[colour] * (2 if depth == 16 else 1)
+    require_decoded_fits(width, height, pixel_bytes, len(packed), name, mask=mask)
+    if height * ((width * depth * _CHANNELS[colour] + 7) // 8) > _MAX_EXPANSION * len(packed):
+        claim = f"its header claims {width} x {height} pixels"
+        raise InputError(f"{name}: {claim}, more than {len(packed)} bytes can hold")
+    if colour == _GREY and depth >= 8 and not header.interlace:
+        fast = decode_grey(packed, width, height, depth)
         if fast is not None:
-            return fast
+            return header, bodies, fast
+    # a file of nothing but what decides the pixels
+    start = [SIGNATURE, _chunk(b"IHDR", struct.pack(">IIBBBBB", *header))]
+    if colour == _PALETTE:
+        palette, colours = bodies.get(b"PLTE", b""), 2**depth
+        if not palette or len(palette) % 3 or len(palette) > 3 * colours:
+            raise InputError(f"{name}: is a damaged PNG: its palette is missing or wrong")
+        # with an entry for every number that a pixel can hold
+        start.append(_chunk(b"PLTE", palette.ljust(3 * colours, b"\0")))
+        if transparent := bodies.get(b"tRNS"):
+            start.append(_chunk(b"tRNS", transparent[:colours]))
+    file = b"".join([*start, *image, _chunk(b"IEND", b"")])
     with decoding() as printed:
-        pixels = cv2.imdecode(np.frombuffer(whole.file(name), np.uint8), flags)
+        pixels = cv2.imdecode(np.frombuffer(file, np.uint8), flags)
     if pixels is None or "libpng" in printed.text:
         raise InputError(f"{name}: is a damaged PNG: its pixel data are wrong")
-    return pixels
+    return header, bodies, pixels
 
 
-def _checked(data: bytes, name: str, mask: bool = False) -> _Whole:
-    """Return what decides the pixels; InputError if the file is not whole."""
+def _chunks(data: bytes, name: str) -> tuple[_Header, dict[bytes, bytes], list[memoryview]]:
+    """Return what decides the pixels: the header, bodies of palette and transparency, and chunks of the data.
+
+    Among the bodies is the text that rollcli wrote beside them.
+    """
     view, position = memoryview(data), len(SIGNATURE)
-    header, bodies, text, kind = None, dict[bytes, bytes](), "", b""
+    header, bodies, kind = None, dict[bytes, bytes](), b""
     image: list[memoryview] = []
     while kind != b"IEND":
         end = position + 12 + int.from_bytes(view[position : position + 4], "big")
@@ -309,16 +287,13 @@ def _checked(data: bytes, name: str, mask: bool = False) -> _Whole:
             header = _header(bytes(body), name)
         elif kind in (b"PLTE", b"tRNS"):
             bodies[kind] = bytes(body)
-        elif kind == b"tEXt" and not (image or text) and body[: len(_TEXT_KEY)] == _TEXT_KEY:
-            text = bytes(body[len(_TEXT_KEY) :]).decode("latin-1")
+        elif kind == b"tEXt" and not image and body[: len(_TEXT_KEY)] == _TEXT_KEY:
+            bodies.setdefault(_TEXT_KEY, bytes(body[len(_TEXT_KEY) :]))
         elif kind != b"IEND" and kind[:1].isupper():
             raise InputError(f"{name}: is no standard PNG: chunk {kind.decode('latin-1')!r} is unknown")
         position = end
     assert header is not None
-    whole = _Whole(header, bodies.get(b"PLTE", b""), bodies.get(b"tRNS", b""), image, text)
-    require_decoded_fits(*header[:2], header.pixel_bytes, whole.packed_size, name, mask=mask)
-    _require_data(whole, name)
-    return whole
+    return header, bodies, image
 
 
 def _header(body: bytes, name: str) -> _Header:
@@ -330,21 +305,6 @@ def _header(body: bytes, name: str) -> _Header:
         raise InputError(f"{name}: is a damaged PNG: its header makes no sense")
     require_pixels(header.width, header.height, name)
     return header
-
-
-def _require_data(whole: _Whole, name: str) -> None:
-    """Refuse a header that claims more than the compressed data hold."""
-    header, compressed = whole.header, whole.packed_size
-    if header.height * header.row_bytes > _MAX_EXPANSION * compressed:
-        claim = f"its header claims {header.width} x {header.height} pixels"
-        raise InputError(f"{name}: {claim}, more than {compressed} bytes can hold")
-
-
-def _full_palette(header: _Header, palette: bytes, name: str) -> bytes:
-    """Return the palette with an entry for every number that a pixel can hold."""
-    if not palette or len(palette) % 3 or len(palette) > 3 * 2**header.depth:
-        raise InputError(f"{name}: is a damaged PNG: its palette is missing or wrong")
-    return palette.ljust(3 * 2**header.depth, b"\0")
 
 
 def _chunk(kind: bytes, body: bytes) -> bytes:

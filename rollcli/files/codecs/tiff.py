@@ -160,7 +160,6 @@ _CHUNKY = 1
 _LARGE_TILE = 2**22  # pixels; a small image may lie in one large tile
 _NOT_A_PAGE_OF_ITS_OWN = 0b101  # a reduced copy, or a mask, of another page
 _GDAL_NODATA = 42113
-_DESCRIPTION = 270
 # how tifffile fails on damaged tags: it has no one error for that
 _DAMAGE = (
     ValueError,
@@ -185,7 +184,7 @@ def decode_tiff(data: bytes, name: str) -> Stored:
             what = "a palette" if page.photometric == _PALETTE else f"{page.samplesperpixel} channels"
             raise InputError(f"{name}: is a colour image ({what}); {COLOUR_REMEDY}")
         values = native(_pixels(page, data, name)[..., 0])
-        return Stored(values, "tiff", nodata=_nodata(page), note=_note(file, name), text=_text(page))
+        return Stored(values, "tiff", nodata=_nodata(page), note=_note(file, name), text=page.description)
 
 
 def picture(data: bytes, name: str) -> NDArray[Any]:
@@ -246,12 +245,25 @@ def _pixels(page: Any, data: bytes, name: str) -> NDArray[Any]:
     _require_size(page, width * height * samples, data, name)
     across, down = _part_size(page, name)
     chunky = samples == 1 or page.planarconfig == _CHUNKY
-    parts = -(-width // across) * -(-height // down) * (1 if chunky else samples)
+    planes = 1 if chunky else samples
+    parts = -(-width // across) * -(-height // down) * planes
     if len(page.dataoffsets) != parts:
         raise InputError(f"{name}: is a damaged TIFF: {len(page.dataoffsets)} parts, not {parts}")
-    planes = 1 if chunky else samples
     shape = (planes, height, width, samples // planes)
-    values = _decoded(page, shape, (down, across), data, name)
+    how = f"compression {int(page.compression)}, {page.bitspersample} bits a number"
+    try:
+        with decoding():
+            if int(page.compression) in _MAX_EXPANSION:
+                values = _decoded_parts(page, shape, (down, across), data)
+            else:  # rare ones, and rare bit depths, may need imagecodecs
+                page.nodata = _EMPTY
+                values = page.asarray().reshape(shape)
+    except DamagedPartError as error:
+        raise InputError(f"{name}: is a damaged TIFF: its compressed data are wrong ({error})") from None
+    except _DAMAGE as error:
+        missing = isinstance(error, ImportError) or "imagecodecs" in str(error)
+        hint = ": pip install imagecodecs" if missing else ""
+        raise InputError(f"{name}: its pixels cannot be decoded ({how}){hint}") from None
     return values[0] if chunky else np.moveaxis(values[..., 0], 0, -1)
 
 
@@ -284,26 +296,6 @@ def _require_size(page: Any, numbers: int, data: bytes, name: str) -> None:
         )
 
 
-def _decoded(
-    page: Any, shape: tuple[int, ...], part: tuple[int, int], data: bytes, name: str
-) -> NDArray[Any]:
-    """Return the numbers; rare compressions and bit depths may need imagecodecs."""
-    how = f"compression {int(page.compression)}, {page.bitspersample} bits a number"
-    try:
-        with decoding():
-            if int(page.compression) in _MAX_EXPANSION:
-                return _decoded_parts(page, shape, part, data)
-            page.nodata = _EMPTY
-            values: NDArray[Any] = page.asarray()
-            return values.reshape(shape)
-    except DamagedPartError as error:
-        raise InputError(f"{name}: is a damaged TIFF: its compressed data are wrong ({error})") from None
-    except _DAMAGE as error:
-        missing = isinstance(error, ImportError) or "imagecodecs" in str(error)
-        hint = ": pip install imagecodecs" if missing else ""
-        raise InputError(f"{name}: its pixels cannot be decoded ({how}){hint}") from None
-
-
 def _nodata(page: Any) -> tuple[float, ...]:
     """GDAL's no-data tag, a number as text."""
     tag = page.tags.get(_GDAL_NODATA)
@@ -311,12 +303,6 @@ def _nodata(page: Any) -> tuple[float, ...]:
         return () if tag is None else (float(str(tag.value).strip("\0 ")),)
     except ValueError:
         return ()
-
-
-def _text(page: Any) -> str:
-    """Return the description."""
-    tag = page.tags.get(_DESCRIPTION)
-    return "" if tag is None else str(tag.value)
 
 
 def _note(file: Any, name: str) -> str:

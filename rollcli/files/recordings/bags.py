@@ -23,8 +23,6 @@ from rollcli.errors import InputError, reading
 from rollcli.files.bounded import MOST_BYTES, most_unpacked
 
 _BEGINNING = 64  # bytes: a header's time and more
-_PIECE = 2**17  # packed bytes that are read at a time where the next header is looked for
-_AHEAD = 2**14  # bytes unpacked beyond what is passed over
 _MCAP, _BAG, _SQLITE = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n", b"SQLite format 3\0"
 
 
@@ -88,7 +86,7 @@ class _Source:
         self.skip(count)
         self._passed = 0
         try:
-            if passed and self._file.seekable():
+            if passed and isinstance(self._file, io.BufferedReader):  # what is unpacked is sought slowly
                 self._file.seek(passed, os.SEEK_CUR)
             elif passed:
                 _exactly(self._file, passed)
@@ -104,33 +102,19 @@ class _Source:
         self._passed += count
 
 
-class _Unpacking(io.RawIOBase):
-    """Some bytes of a file from where it stands, unpacked as far as they are read."""
+def _unpacking(compression: str, packed: bytes) -> Any:
+    """Return a file whose bytes are unpacked as far as they are read."""
+    if compression == "bz2":
+        return bz2.BZ2File(io.BytesIO(packed))
+    if compression == "lz4":
+        from lz4.frame import LZ4FrameFile
 
-    def __init__(self, compression: str, file: BinaryIO, size: int, piece: int) -> None:
-        self._file, self._left, self._piece = file, size, piece
-        self._decoder: Any
-        if compression == "bz2":
-            self._decoder = bz2.BZ2Decompressor()
-        elif compression == "lz4":
-            from lz4.frame import LZ4FrameDecompressor
+        return LZ4FrameFile(io.BytesIO(packed))
+    if compression == "zstd":
+        import zstandard
 
-            self._decoder = LZ4FrameDecompressor()
-        else:
-            raise _BrokenError
-
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: Any) -> int:
-        data = b""
-        while not data and (self._left or not self._decoder.needs_input):
-            # what a decoder is given and does not need yet it would copy each time
-            packed = self._file.read(min(self._piece, self._left)) if self._decoder.needs_input else b""
-            self._left -= len(packed)
-            data = self._decoder.decompress(packed, len(buffer))
-        buffer[: len(data)] = data
-        return len(data)
+        return zstandard.ZstdDecompressor().stream_reader(packed)
+    raise _BrokenError
 
 
 _DAMAGED = (_BrokenError, struct.error, ValueError, KeyError, IndexError)
@@ -230,15 +214,8 @@ class _Chunked:
             return _Source(self._file, there)
         if there > MOST_BYTES or not 0 <= size <= most_unpacked(there):
             raise _BrokenError
-        at_once = at_once or there < packed
-        if compression != "zstd":
-            unpacking = _Unpacking(compression, self._file, there, there if at_once else _PIECE)
-            return _Source(io.BufferedReader(unpacking, _AHEAD), size, at_once=at_once)
-        import zstandard
-
-        source = self._file.read(there) if at_once else self._file
-        unpacked = zstandard.ZstdDecompressor().stream_reader(source, read_size=_PIECE)
-        return _Source(unpacked, size, at_once=at_once)
+        unpacking = _unpacking(compression, self._file.read(there))
+        return _Source(unpacking, size, at_once=at_once or there < packed)
 
     def _walked(self, source: _Source, wanted: _Wanted, size: int, after: int) -> _Records:
         """Return the messages that are whole in a record of a size, each with as many bytes as are wanted."""

@@ -394,15 +394,15 @@ def _spread(found: SequenceAssessment) -> float:
 
 def _frames(rows: Any) -> RigFrames:
     """Columns of whatever was given."""
-    column = _columns_of(rows)
-    rolls, status = column("roll_deg"), column("status")
-    missing = [name for name, found in (("roll_deg", rolls), ("status", status)) if found is None]
-    if missing:
+    if not (isinstance(rows, Mapping) or hasattr(rows, "columns")):
+        rows = _columns(list(rows))
+    if missing := [name for name in ("roll_deg", "status") if name not in rows]:
         raise UsageError(f"the rows have no column {', '.join(missing)}")
-    files = column("file")
-    files = [f"frame {place}" for place in range(len(status))] if files is None else list(map(str, files))
-    states = np.array(list(map(str, status)), dtype=str)
-    numbers = {name: _floats(found) for name in (*COLUMNS, *SIZE) if (found := column(name)) is not None}
+    states = np.array(list(map(str, rows["status"])), dtype=str)
+    files = [f"frame {place}" for place in range(len(states))]
+    if "file" in rows:
+        files = list(map(str, rows["file"]))
+    numbers = {name: _floats(rows[name]) for name in (*COLUMNS, *SIZE) if name in rows}
     if len({len(states), len(files), *map(len, numbers.values())}) > 1:
         raise UsageError("the columns differ in length")
     unknown = sorted(set(states.tolist()) - {"ok", "suspect", "error"})
@@ -411,20 +411,13 @@ def _frames(rows: Any) -> RigFrames:
     return RigFrames(files, states == "ok", states == "suspect", numbers)
 
 
-def _columns_of(rows: Any) -> Any:
-    """Return a function from a column's name to its values, or to None."""
-    if isinstance(rows, Mapping) or hasattr(rows, "columns"):
-        return lambda name: list(rows[name]) if name in rows else None
-    listed = list(rows)
-
-    def column(name: str) -> list[Any] | None:
-        if not listed:
-            return []
-        if isinstance(listed[0], Mapping):
-            return [row.get(name) for row in listed] if any(name in row for row in listed) else None
-        return [getattr(row, name) for row in listed] if hasattr(listed[0], name) else None
-
-    return column
+def _columns(rows: Sequence[Any]) -> dict[str, list[Any]]:
+    """Return the columns of rows that are mappings or have attributes."""
+    names = ("status", "file", *COLUMNS, *SIZE)
+    if rows and not isinstance(rows[0], Mapping):
+        return {name: [getattr(row, name) for row in rows] for name in names if hasattr(rows[0], name)}
+    there = [name for name in names if not rows or any(name in row for row in rows)]
+    return {name: [row.get(name) for row in rows] for name in there}
 
 
 def _floats(values: Sequence[Any]) -> Floats:

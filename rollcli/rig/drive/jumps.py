@@ -103,15 +103,15 @@ class _Search:
         return self._likelihood.fit(self._design(starts, drift))
 
     def _scored(self, starts: Sequence[int], drift: bool) -> Found:
-        if not is_told(self._design(starts, drift)):
-            return Found(tuple(starts), drift, -math.inf)
         penalty = TUNING.jump_penalty * len(starts) + TUNING.drift_penalty * drift
         return Found(tuple(starts), drift, self._fit(starts, drift).evidence - penalty)
 
     def _proposals(self, found: Found) -> list[tuple[int, ...]]:
         """Return what is there with the step that tells most, and with the two that do."""
         design, fit = self._design(found.starts, found.drift), self._fit(found.starts, found.drift)
-        allowed = self._allowed(found.starts)
+        # far enough from the others and from both ends
+        edges = np.array([0, *found.starts, self._frames])
+        allowed: Flags = np.abs(self._first[:, None] - edges).min(axis=1) >= self._gap
         if not allowed.any():
             return []
         one = np.where(allowed, self._likelihood.scan(design, fit), -np.inf)
@@ -122,11 +122,6 @@ class _Search:
         if both.any():
             places.append([int(each) for each in np.unravel_index(int(two.argmax()), two.shape)])
         return [tuple(sorted([*found.starts, *(int(self._first[at]) for at in each)])) for each in places]
-
-    def _allowed(self, starts: Sequence[int]) -> Flags:
-        """Cells where a further jump may be: far enough from the others and from both ends."""
-        edges = np.array([0, *starts, self._frames])
-        return np.asarray(np.abs(self._first[:, None] - edges).min(axis=1) >= self._gap)
 
     def _lasts(self, found: Found, start: int) -> bool:
         """Tell whether the level after a jump stays changed, rather than being a kick that fades."""

@@ -144,7 +144,7 @@ def assess_sequence(values: ArrayLike, errors: ArrayLike, unit: float = 1.0) -> 
     found = search(series, unit)
     fitted = _Fitted(series, found.starts, found.drift, unit)
     jumps = tuple(
-        Jump(start, fitted.estimate(fitted.unit_row(place + 1) - fitted.unit_row(place)))
+        Jump(start, fitted.estimate(fitted.level(place + 1, start) - fitted.level(place, start)))
         for place, start in enumerate(found.starts)
     )
     status: Status = "jump" if jumps else "drift" if found.drift else "stable"
@@ -176,10 +176,12 @@ class _Fitted:
             self._there[-1] = False
         self._fit: Fit = Likelihood(self._cells, unit).fit(design[:, self._there])
 
-    def unit_row(self, place: int) -> Floats:
-        """Return the contrast of one coefficient."""
+    def level(self, place: int, frame: float) -> Floats:
+        """Return the contrast of a stretch's level, drawn out by the line, at a frame."""
         row = np.zeros(len(self._there))
         row[place] = 1
+        if self._drift:
+            row[-1] = (frame - (self._frames - 1)) / max(self._frames - 1, 1)
         return row
 
     def estimate(self, contrast: Floats) -> Estimate:
@@ -193,7 +195,7 @@ class _Fitted:
         """Return the change over the drive; unknown of a few frames."""
         if self._series.used.sum() < TUNING.fewest or not self._there[-1]:
             return Estimate()
-        return self.estimate(self.unit_row(-1))
+        return self.estimate(np.eye(len(self._there))[-1])
 
     def segments(self) -> list[Segment]:
         """Return the stretches with their values."""
@@ -204,26 +206,18 @@ class _Fitted:
 
     def mean_over(self, first: int, end: int) -> Estimate:
         """Return the mean of frames whose ends are ends of stretches."""
-        row = np.zeros(len(self._there))
-        for place, (begin, stop) in enumerate(bounds_of(self._starts, self._frames)):
-            if first <= begin and stop <= end and self._there[place]:
-                row[place] = int(self._series.used[begin:stop].sum())
-        row /= max(row.sum(), 1.0)
-        if self._drift:
-            row[-1] = ((first + end - 1) / 2 - (self._frames - 1)) / max(self._frames - 1, 1)
-        return self.estimate(row) if row.any() else Estimate()
+        within = {
+            place: int(self._series.used[begin:stop].sum())
+            for place, (begin, stop) in enumerate(bounds_of(self._starts, self._frames))
+            if first <= begin and stop <= end and self._there[place]
+        }
+        middle, total = (first + end - 1) / 2, sum(within.values())
+        levels = [count / total * self.level(place, middle) for place, count in within.items() if total]
+        return self.estimate(np.sum(levels, axis=0)) if levels else Estimate()
 
     def _values(self, place: int, first: int, end: int) -> tuple[Estimate, Estimate, Estimate]:
-        if not self._drift:
-            mean = self.estimate(self.unit_row(place))
-            return mean, mean, mean
-        mean, begin, last = (
-            self.estimate(
-                self.unit_row(place)
-                + (frame - (self._frames - 1)) / max(self._frames - 1, 1) * self.unit_row(-1)
-            )
-            for frame in ((first + end - 1) / 2, first, end - 1)
-        )
+        frames = ((first + end - 1) / 2, first, end - 1)
+        mean, begin, last = (self.estimate(self.level(place, each)) for each in frames)
         return mean, begin, last
 
     def between_sd(self) -> float:

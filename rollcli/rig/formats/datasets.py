@@ -9,20 +9,19 @@ calibration.pdf): *_camera.json with intrinsic {fx, fy, u0, v0} and extrinsic {b
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from rollcli.errors import InputError
 from rollcli.rig.formats.fields import (
     Fields,
     File,
     Projection,
-    Size,
     json_values,
     keys_and_values,
     number,
     numbers,
     pair_of,
     require_one_pair,
-    size,
     size_of,
     swapped,
 )
@@ -55,14 +54,17 @@ def read_kitti(file: File) -> Fields:
             f"{file.name}: has only {views}: the projections of both views are needed, "
             f"{key.format(0)} and {key.format(1)} or {key.format(2)} and {key.format(3)}"
         )
-    fields = [_kitti_pair(file, values, *(key.format(view) for view in pair)) for pair in pairs]
-    notes: tuple[str, ...] = ()
-    if len(pairs) == 2:
-        notes = (
-            f"{file.name}: the baseline is that of the grey cameras 0 and 1, {fields[0][1]:.5f} m; "
-            f"for images of the colour cameras 2 and 3 give --baseline {fields[1][1]:.5f}",
+    size_key = f"S_rect_0{pairs[0][0]}"
+    first, *other = (
+        _kitti_fields(file, values, size_key, *(key.format(view) for view in pair)) for pair in pairs
+    )
+    if other:
+        note = (
+            f"{file.name}: the baseline is that of the grey cameras 0 and 1, {first.baseline:.5f} m; "
+            f"for images of the colour cameras 2 and 3 give --baseline {other[0].baseline:.5f}"
         )
-    return _kitti_fields(file, values, "S_rect_0" + pairs[0][0], fields[0], notes)
+        first = replace(first, notes=(note,))
+    return first
 
 
 def read_driving_stereo(file: File) -> Fields:
@@ -71,7 +73,7 @@ def read_driving_stereo(file: File) -> Fields:
     missing = [key for key in DRIVING_STEREO if key not in values]
     if missing:
         raise InputError(f"{file.name}: has no {missing[0]}: the file is cut off")
-    return _kitti_fields(file, values, "S_rect_101", _kitti_pair(file, values, *DRIVING_STEREO))
+    return _kitti_fields(file, values, "S_rect_101", *DRIVING_STEREO)
 
 
 def _kitti_values(file: File) -> dict[str, str]:
@@ -83,10 +85,8 @@ def _kitti_values(file: File) -> dict[str, str]:
     return values
 
 
-def _kitti_pair(
-    file: File, values: Mapping[str, str], left: str, right: str
-) -> tuple[Projection, float, float]:
-    """Return the left view, the baseline in metres and doffs."""
+def _kitti_fields(file: File, values: Mapping[str, str], size_key: str, left: str, right: str) -> Fields:
+    """Return the left view, the baseline in metres, doffs, and the size where it is stated."""
     views = [
         Projection.of(numbers(values[key].split(), f"{file.name}: {key}"), f"{file.name}: {key}")
         for key in (left, right)
@@ -94,25 +94,11 @@ def _kitti_pair(
     baseline, doffs = pair_of(views[0], views[1], file.name)
     if baseline < 0:
         raise swapped(file.name)
-    return views[0], baseline, doffs
-
-
-def _kitti_fields(
-    file: File,
-    values: Mapping[str, str],
-    size_key: str,
-    pair: tuple[Projection, float, float],
-    notes: tuple[str, ...] = (),
-) -> Fields:
-    view, baseline, doffs = pair
-    stated, found = values.get(size_key, "").split(), Size()
-    if stated:
-        if len(stated) != 2:
-            raise InputError(
-                f"{file.name}: {size_key} has {len(stated)} numbers: width and height are needed"
-            )
-        found = size_of(stated[0], stated[1], f"{file.name}: {size_key}")
-    return Fields(view.fx, view.fy, view.cx, view.cy, baseline, doffs, *found, notes=notes)
+    stated, what = values.get(size_key, "").split(), f"{file.name}: {size_key}"
+    if len(stated) not in (0, 2):
+        raise InputError(f"{what} has {len(stated)} numbers: width and height are needed")
+    width, height = stated or (None, None)
+    return Fields(*views[0][:4], baseline, doffs, *size_of(width, height, what))
 
 
 def read_middlebury(file: File) -> Fields:
@@ -132,7 +118,7 @@ def read_middlebury(file: File) -> Fields:
     if "baseline" not in values:
         return Fields(fx, fy, cx, cy, None, doffs, lacks="has no baseline: the file is cut off")
     baseline = _MM * number(values["baseline"], f"{file.name}: baseline")
-    found = size(values, "width", "height", f"{file.name}: width and height")
+    found = size_of(values.get("width"), values.get("height"), f"{file.name}: width and height")
     return Fields(fx, fy, cx, cy, baseline, doffs or 0.0, *found)
 
 

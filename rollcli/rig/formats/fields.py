@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -115,26 +115,14 @@ def numbers(values: Value | Iterable[str], what: str) -> list[float]:
     return [number(value, what) for value in values]
 
 
-class Size(NamedTuple):
-    """Of the images that a calibration is for, pixels; None where it is not stated."""
-
-    width: int | None = None
-    height: int | None = None
-
-
-def size(values: Mapping[str, Value], width: str, height: str, what: str) -> Size:
-    """Return the image size that two values state, in whole pixels."""
-    if width not in values or height not in values:
-        return Size()
-    return size_of(values[width], values[height], what)
-
-
-def size_of(width: Value, height: Value, what: str) -> Size:
-    """Return an image size in whole pixels."""
+def size_of(width: Value | None, height: Value | None, what: str) -> tuple[int | None, int | None]:
+    """Return an image size in whole pixels; None where a side is not stated."""
+    if width is None or height is None:
+        return None, None
     found = number(width, what), number(height, what)
     if not all(1 <= side <= 1e6 and side == int(side) for side in found):
         raise InputError(f"{what} is {found[0]:g}x{found[1]:g} px: that is no image")
-    return Size(int(found[0]), int(found[1]))
+    return int(found[0]), int(found[1])
 
 
 def pair_of(left: Projection, right: Projection, where: str) -> tuple[float, float]:

@@ -11,7 +11,7 @@ alone: rectification chooses focal length and principal point anew, and neither 
 import math
 
 from rollcli.errors import InputError
-from rollcli.rig.formats.fields import Fields, File, Projection, number, numbers, pair_of, size
+from rollcli.rig.formats.fields import Fields, File, Projection, number, numbers, pair_of, size_of
 from rollcli.rig.formats.yaml import parse_yaml
 
 _MM = 1e-3
@@ -54,9 +54,10 @@ def _view(file: File) -> tuple[Projection, int | None, int | None]:
     if not matrix:
         raise InputError(f"{file.name}: has no projection_matrix, or not at its top level")
     data = matrix.get("data", []) if isinstance(matrix, dict) else matrix
+    width, height = (values.get(f"image_{side}") for side in ("width", "height"))
     what = f"{file.name}: projection_matrix"
     view = Projection.of(numbers(data, what), what)
-    return view, *size(values, "image_width", "image_height", f"{file.name}: image size")
+    return view, *size_of(width, height, f"{file.name}: image size")
 
 
 def read_orb_slam(file: File) -> Fields:
@@ -73,7 +74,8 @@ def read_orb_slam(file: File) -> Fields:
     if fx == 0:
         raise InputError(f"{file.name}: Camera.fx is 0: a focal length is more")
     baseline = read("Camera.bf") / fx if "Camera.bf" in values else read("Stereo.b")
-    found = size(values, "Camera.width", "Camera.height", f"{file.name}: Camera.width")
+    width, height = (values.get(f"Camera.{side}") for side in ("width", "height"))
+    found = size_of(width, height, f"{file.name}: Camera.width")
     return Fields(fx, fy, cx, cy, baseline, 0.0, *found)
 
 

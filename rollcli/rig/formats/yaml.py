@@ -16,6 +16,8 @@ _MATRIX = "tag:yaml.org,2002:opencv-"
 # OpenCV's first line is no directive of YAML, and its files may lack the space after a key's colon
 _DIRECTIVE = re.compile(r"^%YAML.*", re.MULTILINE)
 _TIGHT_KEY = re.compile(r"^( *[\w.]+):(?=\S)", re.MULTILINE)
+# PyYAML refuses tabs where other readers do not: anywhere but in the indentation
+_INNER_TABS = re.compile(r"(?<=\S)[ \t]*\t[ \t]*|^[ \t]+$", re.MULTILINE)
 
 
 def parse_yaml(text: str, name: str) -> dict[str, Value]:
@@ -63,7 +65,7 @@ def parse_yaml(text: str, name: str) -> dict[str, Value]:
 
     if "%YAML:" in text:
         text = _TIGHT_KEY.sub(r"\1: ", text)
-    text = _without_inner_tabs(_DIRECTIVE.sub("", text, count=1))
+    text = _INNER_TABS.sub(" ", _DIRECTIVE.sub("", text, count=1))
     try:
         values = Loader(text).get_data()
     except yaml.MarkedYAMLError as error:
@@ -78,16 +80,6 @@ def parse_yaml(text: str, name: str) -> dict[str, Value]:
     if not isinstance(values, dict):
         raise InputError(f"{name}: holds no value that has a name")
     return values
-
-
-def _without_inner_tabs(text: str) -> str:
-    """Put spaces where PyYAML refuses tabs and other readers do not: anywhere but in the indentation."""
-    if "\t" not in text:
-        return text
-    lines = (line.rstrip() for line in text.splitlines())
-    return "\n".join(
-        line[: len(line) - len(line.lstrip())] + line.lstrip().replace("\t", " ") for line in lines
-    )
 
 
 def _unreadable(name: str, place: Any, why: str) -> InputError:

@@ -62,7 +62,7 @@ def test_equal_gradients_end_it():
 def test_it_takes_the_path_of_the_papers_equations(roll_deg):
     disparity = bent_road(roll_deg, width=150, height=100, noise=0.5)
     ours = gradient_descent(energy_of(disparity), SolverSettings(1.7e-6))
-    papers = Textbook.of(disparity).gradient_descent(1.7e-6, 26.0)
+    papers = Textbook(disparity).gradient_descent(1.7e-6, 26.0)
     assert ours.iterations == papers.iterations
     assert degrees_apart(ours.theta, papers.theta) < 1e-6
 
@@ -152,6 +152,6 @@ def test_it_ends_near_a_minimum_or_at_the_end_of_its_bracket(disparity):
 
 def test_it_takes_the_path_of_the_textbook_form():
     disparity = bent_road(-7, noise=0.5)
-    found, textbook = golden_section(energy_of(disparity)), Textbook.of(disparity).golden_section(1.7e-6)
+    found, textbook = golden_section(energy_of(disparity)), Textbook(disparity).golden_section(1.7e-6)
     assert found.iterations == textbook.iterations == 30
     assert degrees_apart(found.theta, textbook.theta) < 1e-6
