@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
 
 from rollcli.errors import RollcliError, raised_at
 from rollcli.files.stores.locations import computing
@@ -236,13 +236,6 @@ class Workers:
     threads: int = 1
 
 
-class _Attempt(NamedTuple):
-    """What came of a task that was begun."""
-
-    result: Any
-    error: Exception | None = None
-
-
 class Chunk(Generic[Task, Result]):
     """A chunk that a worker has in hand.
 
@@ -271,8 +264,9 @@ class Chunk(Generic[Task, Result]):
     ) -> None:
         self._do, self._join, self._tasks = do, join, tasks
         self._stopped, self._longest_s = stopped, longest_s
-        self._over, self._failed = 0.0, False
-        self._attempts: Iterable[_Attempt | None] = map(self._attempt, tasks)
+        self._over = 0.0
+        self._error: Exception | None = None
+        self._attempts: Iterable[tuple[Result, ...]] = map(self._attempt, tasks)
         if threads is not None:
             futures = [threads.submit(self._attempt_in_turn, task) for task in tasks]
             self._all_begun = threads.submit(lambda: None)  # begins after them
@@ -286,30 +280,28 @@ class Chunk(Generic[Task, Result]):
         """Wait for the end of the chunk; return what was done of it."""
         start = time.monotonic()
         every = list(self._attempts)  # all of them: none goes on when the worker ends
-        begun = list(itertools.takewhile(lambda attempt: attempt is not None, every))
-        error = next((each.error for each in begun if each and each.error), None)
-        results = [each.result for each in begun if each and not each.error]
+        results = list(itertools.chain(*itertools.takewhile(len, every)))
         seconds = time.monotonic() - start  # what else a chunk costs does not grow with its tasks
         try:
-            return Done(self._join(self._tasks, results) if results else [], seconds, error)
+            return Done(self._join(self._tasks, results) if results else [], seconds, self._error)
         except Exception as failed:  # noqa: BLE001 (whoever asked for the results raises it)
             return Done([], seconds, _portable(failed))
 
-    def _attempt_in_turn(self, task: Task) -> _Attempt | None:
+    def _attempt_in_turn(self, task: Task) -> tuple[Result, ...]:
         with computing():
             return self._attempt(task)
 
-    def _attempt(self, task: Task) -> _Attempt | None:
-        """Do a task; None where the chunk has ended before it."""
+    def _attempt(self, task: Task) -> tuple[Result, ...]:
+        """Do a task, and return its result; nothing where it fails, or the chunk has ended before it."""
         now = time.monotonic()
         self._over = self._over or now + self._longest_s
-        if self._stopped.is_set() or self._failed or now > self._over:
-            return None
+        if self._stopped.is_set() or self._error or now > self._over:
+            return ()
         try:
-            return _Attempt(self._do(task))
+            return (self._do(task),)
         except Exception as error:  # noqa: BLE001 (whoever asked for the result raises it)
-            self._failed = True
-            return _Attempt(None, _portable(error))
+            self._error = _portable(error)
+            return ()
 
 
 def _portable(error: Exception) -> Exception:
