@@ -8,17 +8,16 @@ from itertools import islice
 from typing import NamedTuple
 
 from rollcli.errors import ExitStatus, OutputError, WorkerError
-from rollcli.files.containers import file_of
-from rollcli.files.stores.locations import is_url, tasks_in_hand
+from rollcli.files.stores.locations import is_url
 from rollcli.run.batch import Batch, BatchOptions, Step, join_results, line_form
 from rollcli.run.find import calibration_files, calibration_notes
 from rollcli.run.frame import Frame, FrameResult, ReadAs, failed_frame
 from rollcli.run.options import EstimateOptions, FrameOptions
 from rollcli.run.outputs import every_path, image_paths, list_files, remove_image_leftovers, write_outputs
-from rollcli.run.plan import Plan, make_plan
+from rollcli.run.plan import Plan, decoder_for, make_plan, workers_for
 from rollcli.run.progress import Progress
 from rollcli.run.result import Output, frames_to_do, open_output
-from rollcli.run.workers.chunks import Work, Workers
+from rollcli.run.workers.chunks import Work
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
 from rollcli.run.workers.tasks import require_scheduler, run_joined
 
@@ -28,13 +27,6 @@ def estimate_frame(frame: Frame, options: FrameOptions) -> FrameResult:
     from rollcli.run.estimate_frame import run_frame
 
     return run_frame(frame, options)
-
-
-def decode_frame(frame: Frame, options: FrameOptions) -> Frame:
-    """Read the views of a frame of videos, for a worker of this machine."""
-    from rollcli.run.read import decoded
-
-    return decoded(frame, options)
 
 
 def lost_frame(frame: Frame, reason: str, options: FrameOptions) -> FrameResult:
@@ -185,18 +177,10 @@ def _results(step: Step, run: _Run) -> Iterator[Iterator[Batch]]:
         partial(join_results, options=rows),
         lambda: record.read_as if record else ReadAs(),
         parts.rows if parts else 1,
-        partial(decode_frame, options=told) if any(frame.of_videos for frame in frames) else None,
+        decoder_for(frames, told),
     )
-    sample = (*frames[:1], *frames[-1:])
-    files = tuple(file_of(path) for frame in sample for path in frame.reads())
-    folders = tuple(folder for _, folder in options.images.folders())
-    workers = Workers(
-        options.running.jobs,
-        options.running.scheduler,
-        files,
-        (*folders, parts.output) if parts else folders,
-        tasks_in_hand((*files, *folders)),
-    )
+    folders = [folder for _, folder in options.images.folders()]
+    workers = workers_for(frames, options.running, folders, [parts.output] if parts else [])
     try:
         with contextlib.closing(run_joined(frames, work, run.stop, workers)) as results:
             yield results

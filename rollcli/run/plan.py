@@ -1,16 +1,18 @@
 """Decide and check what a run will read and write, before anything runs."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 
 from rollcli.errors import UsageError
+from rollcli.files.containers import file_of
 from rollcli.files.results import IMAGE_ROLL, TIMING, Format, run_path
-from rollcli.files.stores.locations import is_url
+from rollcli.files.stores.locations import is_url, tasks_in_hand
 from rollcli.files.stream import is_stream
 from rollcli.run.find import Named, calibration_files, check_depth, check_first_size, map_frames, pair_frames
 from rollcli.run.frame import Frame
-from rollcli.run.options import EstimateOptions, ResultOptions
+from rollcli.run.options import EstimateOptions, FrameOptions, ResultOptions, RunningOptions
 from rollcli.run.outputs import (
     check_inputs_are_kept,
     check_nothing_is_there,
@@ -19,6 +21,7 @@ from rollcli.run.outputs import (
     every_path,
 )
 from rollcli.run.result_file import inputs_path
+from rollcli.run.workers.chunks import Workers
 
 
 @dataclass(frozen=True)
@@ -138,3 +141,26 @@ def _find_frames(options: EstimateOptions) -> Sequence[Frame]:
     if options.images.disparity is not None:
         raise UsageError("--disparity writes maps computed from --left and --right; here maps are the input")
     return map_frames(named)
+
+
+def workers_for(
+    frames: Sequence[Frame], running: RunningOptions, folders: Iterable[str], parts: Iterable[str] = ()
+) -> Workers:
+    """Say which workers do the frames, what they write below `folders`, and what they must see.
+
+    `parts`: the folder of those parts of a result that they write.
+    """
+    files = tuple(file_of(path) for frame in (*frames[:1], *frames[-1:]) for path in frame.reads())
+    threads = tasks_in_hand((*files, *folders))
+    return Workers(running.jobs, running.scheduler, files, (*folders, *parts), threads)
+
+
+def decoder_for(frames: Iterable[Frame], options: FrameOptions) -> Callable[[Frame], Frame] | None:
+    """Return what reads the views of frames of videos for the workers of this machine; see `Work.prepare`."""
+    return partial(_decode, options=options) if any(frame.of_videos for frame in frames) else None
+
+
+def _decode(frame: Frame, options: FrameOptions) -> Frame:
+    from rollcli.run.read import decoded  # loads NumPy, which other runs leave to the workers
+
+    return decoded(frame, options)
