@@ -161,7 +161,8 @@ def _results(step: Step, run: _Run) -> Iterator[Iterator[Batch]]:
     """Open the results of a step from whichever workers were asked for; the output is complete afterwards."""
     options, output, frames, parts = run.plan.options, run.output, step.frames, step.parts
     record = output.record
-    told = options.frame._replace(replaces=output.replaces, retry_of=step.retry_of, notes=record is not None)
+    replaces = record.replaces if record else options.running.overwrite
+    told = options.frame._replace(replaces=replaces, retry_of=step.retry_of, notes=record is not None)
     rows = BatchOptions(
         line_form(options.result.form),
         run.plan.further,

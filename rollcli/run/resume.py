@@ -9,6 +9,7 @@ import io
 import json
 import os
 import uuid
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from itertools import islice
@@ -30,7 +31,7 @@ from rollcli.run.options import (
     MethodOptions,
     RegionOptions,
 )
-from rollcli.run.outputs import Existing, check_nothing_is_there, possible_paths
+from rollcli.run.outputs import Existing, check_nothing_is_there, local_images, possible_paths, remove_marks
 from rollcli.run.plan import Plan, images_of
 from rollcli.run.progress import RunSummary
 from rollcli.run.result_file import Inputs, data_of, row_lines
@@ -247,7 +248,7 @@ class KeptRows:
         How many they are, holes included.
     errors : list of int
         Positions, from 0, of those without an angle.
-    holes : list of range
+    holes : list of int
         Positions before others that have no row: parts that workers had not written.
     again : list of int
         Positions of those whose frames are done again: they have failed, have changed, or are not done yet.
@@ -266,7 +267,7 @@ class KeptRows:
 
     def __init__(self, plan: Plan, rows: Iterable[Row] = (), inputs: Inputs | None = None) -> None:
         self.count, self.changed, self.first_changed, self.gone = 0, 0, "", 0
-        self.holes: list[range] = []
+        self.holes: list[int] = []
         self.errors: list[int] = []
         self.again: list[int] = []
         self.incomplete: list[Frame] = []
@@ -330,7 +331,7 @@ class KeptRows:
     def skip_to(self, position: int) -> None:
         """Leave a hole before the row at a position."""
         if position > self.count:
-            self.holes.append(range(self.count, position))
+            self.holes += range(self.count, position)
             self.summary.leave_places([frame.file for frame in self._frames[self.count : position]])
             self.count, self._following = position, iter(self._frames[position:])
 
@@ -384,17 +385,54 @@ def _is_in_order(data: bytes, plan: Plan) -> bool:
     return True
 
 
-def check_restored(batch: Batch) -> None:
-    """Check that the images of kept rows were made again.
+class RecordedOutput(ABC):
+    """What a file and a folder of parts have in common: the record of the run, and rows in place of others.
 
-    Raises
-    ------
-    OutputError
-        They could not be: a row no longer holds.
+    Attributes
+    ----------
+    record : RunRecord
+        FILE.run.json.
+    kept : KeptRows
+        What is known of the rows of an interrupted run, which is resumed.
     """
-    for row in (result.row for result in batch.told):
-        if row.status == "error":
-            raise OutputError(f"the images of {row.file} cannot be made again: {row.message}")
+
+    def __init__(self, record: RunRecord, kept: KeptRows) -> None:
+        self.record, self.kept, self._plan = record, kept, record.plan
+        self._replacing: dict[int, tuple[bytes, bytes]] = {}  # rows, and the lines of their inputs
+
+    def restore(self, frames: Sequence[Frame], batch: Batch) -> None:
+        """Take the images of incomplete frames, which were made again.
+
+        Raises
+        ------
+        OutputError
+            They could not be made: a row no longer holds.
+        """
+        for row in (result.row for result in batch.told):
+            if row.status == "error":
+                raise OutputError(f"the images of {row.file} cannot be made again: {row.message}")
+        self._take_images(frames, batch.figures.status)
+
+    def replace(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
+        """Take rows in the place of kept ones, and their images; positions increase.
+
+        `commit` writes them all at once.
+        """
+        self.record.saw(batch.read_as)
+        self._replacing.update(zip(positions, zip(batch.lines, batch.notes, strict=True), strict=True))
+        self._take_images(frames, batch.figures.status)
+
+    def _take_images(self, frames: Sequence[Frame], status: bytes) -> None:
+        self._keep_images(local_images(frames, status, self._plan.options.images))
+
+    @abstractmethod
+    def _keep_images(self, images: Iterable[str]) -> None:
+        """Have images forced to the disk before the rows that come next are written."""
+
+    def _end_replacing(self) -> None:
+        """Forget the rows that are written, and what told their images from those of other programs."""
+        remove_marks([self._plan.frames[at] for at in self._replacing], self._plan.options.images)
+        self._replacing.clear()
 
 
 def new_record(plan: Plan, kept: KeptRows) -> RunRecord:
