@@ -102,8 +102,9 @@ class ResultFile:
             The disk does not take the new file; the old one is as it was.
         """
         first = -1 if form == "csv" else 0  # the header
-        rest = enumerate(row_lines(self._old_lines(), form), first)
-        self.rewrite(rows.get(position, line) for position, line in rest)
+        with writing(self._name):
+            old = io.BytesIO(Path(self._name).read_bytes())
+        self.rewrite(rows.get(at, line) for at, line in enumerate(row_lines(old, form), first))
 
     def rewrite(self, lines: Iterable[bytes]) -> None:
         """Write the file anew, all in one step, and continue behind these lines; see `replace`."""
@@ -119,13 +120,6 @@ class ResultFile:
                 locked_file = os.dup(new.fileno())  # the lock is the open file's, and stays with it
                 held.callback(os.close, locked_file)
             os.dup2(locked_file, self._descriptor, inheritable=False)
-
-    def _old_lines(self) -> Iterator[bytes]:
-        if _ON_WINDOWS:  # it renames onto no open file
-            yield from io.BytesIO(self.read())
-            return
-        with Path(os.path.realpath(self._name)).open("rb") as old:
-            yield from old
 
     def _replace_closed(self, target: str, data: bytes) -> None:
         """Write the file anew while it is closed: Windows renames onto no open file.

@@ -75,11 +75,7 @@ class RunRecord:
         self._begun = False
         # older images, now and after a resume
         self.replaces = options.running.overwrite or options.result.update
-        self.fixed = {
-            "rollcli": __version__,
-            "options": _effective(plan),
-            "inputs": names_of(plan.frames),
-        }
+        self.fixed = {"rollcli": __version__, "options": _effective(plan), "inputs": names_of(plan.frames)}
         if options.calibration.given:
             self.fixed["calibration"] = _calibrations(plan.frames)
 
@@ -252,10 +248,8 @@ class KeptRows:
         Positions before others that have no row: parts that workers had not written.
     again : list of int
         Positions of those whose frames are done again: they have failed, have changed, or are not done yet.
-    changed : int
-        How many frames hold something else than their rows were made from.
-    first_changed : str
-        The file of the first of them; empty where there is none.
+    changed : list of str
+        The files of frames that hold something else than their rows were made from.
     gone : int
         How many rows have left the result, since their frames are gone.
     incomplete : list of Frame
@@ -266,7 +260,8 @@ class KeptRows:
     """
 
     def __init__(self, plan: Plan, rows: Iterable[Row] = (), inputs: Inputs | None = None) -> None:
-        self.count, self.changed, self.first_changed, self.gone = 0, 0, "", 0
+        self.count, self.gone = 0, 0
+        self.changed: list[str] = []
         self.holes: list[int] = []
         self.errors: list[int] = []
         self.again: list[int] = []
@@ -304,8 +299,7 @@ class KeptRows:
                 elif not self.inputs.take(frame):
                     return False
                 if not is_again and self.inputs.has_changed(frame):
-                    self.changed += 1
-                    self.first_changed = self.first_changed or frame.file
+                    self.changed.append(frame.file)
                     is_again = True
             if row.status != "error" and not is_again:
                 images = possible_paths(frame, self._images)
@@ -323,8 +317,8 @@ class KeptRows:
 
     def notes(self) -> Iterator[str]:
         """Yield what is said of an update before it begins."""
-        if self.changed:
-            yield f"frames that are done again, since what they were made from has changed: {self.changed}"
+        if changed := len(self.changed):
+            yield f"frames that are done again, since what they were made from has changed: {changed}"
         if self.gone:
             yield f"frames that are gone, whose rows leave the result and whose images stay: {self.gone}"
 
@@ -354,8 +348,6 @@ def arranged(data: bytes, plan: Plan) -> tuple[bytes, int]:
     bytes, int
         The result; and how many rows have left it, since their frames are gone.
     """
-    if _is_in_order(data, plan):
-        return data, 0
     lines = row_lines(io.BytesIO(data), plan.format)
     header = next(lines) if plan.format == "csv" else b""
     places, ends, end = dict[int, int](), [len(header)], len(header)
@@ -373,16 +365,6 @@ def arranged(data: bytes, plan: Plan) -> tuple[bytes, int]:
             pieces += [*waiting, data[ends[place] : ends[place + 1]]]
             waiting.clear()
     return b"".join(pieces), len(places)
-
-
-def _is_in_order(data: bytes, plan: Plan) -> bool:
-    """Tell whether each row is of the frame in its place."""
-    frames = iter(plan.frames)
-    for row in parse_rows(data, plan.output):
-        frame = next(frames, None)
-        if frame is None or (frame.file, frame.right_file) != (row.file, row.right_file):
-            return False
-    return True
 
 
 class RecordedOutput(ABC):
@@ -511,9 +493,9 @@ def _differences(
         yield f"it was begun with {inputs_was.get('frames')} frames, now there are {inputs_now['frames']}"
     if inputs_was.get("names") != inputs_now["names"]:
         yield f"the names of the inputs differ{hint}"
-    if kept.first_changed:
+    if kept.changed:
         how = "" if plan.in_parts else "; --update does again what has changed"
-        yield f"{kept.first_changed} has changed since{how}"
+        yield f"{kept.changed[0]} has changed since{how}"
 
 
 _LISTS = {"encoding": str, "disparities_searched_px": int}
