@@ -49,10 +49,10 @@ class LazyGroup(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if args and not args[0].startswith("-") and args[0] not in COMMANDS:
-            import difflib
+            from rollcli.cli.command import nearest  # nothing else needs it at each start
 
-            close = difflib.get_close_matches(args[0].lower(), COMMANDS, n=1)
-            hint = f"; did you mean {close[0]!r}?" if close else f"; commands: {', '.join(COMMANDS)}"
+            close = nearest(args[0].lower(), COMMANDS)
+            hint = f"; did you mean {close!r}?" if close else f"; commands: {', '.join(COMMANDS)}"
             raise click.UsageError(f"there is no command {args[0]!r}{hint}", ctx)
         return super().resolve_command(ctx, args)
 
