@@ -17,7 +17,7 @@ from rollcli.files.atomic import is_folder, mark_path, remove_leftovers
 from rollcli.files.containers import file_of, shown
 from rollcli.files.results import STATUSES
 from rollcli.files.storage import create, read_bytes, remove, remove_all, write_bytes
-from rollcli.files.stores.locations import is_object_url, is_url, located, public_name, split_url
+from rollcli.files.stores.locations import is_object_url, is_url, located, public_name
 from rollcli.files.stores.objects import list_objects
 from rollcli.files.stream import STDOUT, open_stream
 from rollcli.run.frame import Frame
@@ -273,10 +273,9 @@ class Existing:
     def __contains__(self, path: str) -> bool:
         if not is_object_url(path):
             return not _is_empty(path) if self._filled else os.path.lexists(path)
-        root = split_url(path)[0]
         folder = next((each for each in self._listed if path.startswith(each)), None)
         if folder is None:
-            folder = path[: path.rindex("/") + 1] if path.count("/") > root.count("/") + 1 else f"{root}/"
+            folder = path[: path.rindex("/") + 1]
             self._listed[folder] = {url for url, size, _ in list_objects(folder) if size or not self._filled}
         return path in self._listed[folder]
 
