@@ -103,7 +103,6 @@ class ClusterExecutor(Generic[Task, Result]):
             self._resources.callback(self._client.close, timeout=2)
             for worker, problem in self._look_for_workers().items():
                 raise WorkerError(f"worker {worker}: {problem}")
-            self._client.register_plugin(_worker_plugin())
         except BaseException:
             self._resources.close()
             raise
@@ -267,6 +266,7 @@ _LOCK = threading.Lock()
 
 def _run_here(run: str, threads: int = 1) -> _RunHere:
     with _LOCK:
+        prepare_worker()
         while run not in _RUNS and len(_RUNS) >= _RUNS_KEPT:
             del _RUNS[next(iter(_RUNS))]
         return _RUNS.setdefault(run, _RunHere(threads))
@@ -345,21 +345,6 @@ def _connect(address: str) -> Any:
         client.close(timeout=1)
         raise WorkerError(f"{address}: has no workers; start some: dask worker {address}") from error
     return client
-
-
-def _worker_plugin() -> Any:
-    from distributed import WorkerPlugin
-
-    class PrepareWorker(WorkerPlugin):
-        """Sets up every worker process, also those that join later."""
-
-        name = "rollcli"
-
-        def setup(self, worker: Any) -> None:
-            """Set up the process that this worker runs in."""
-            prepare_worker()
-
-    return PrepareWorker()
 
 
 def _problems(client: Any, asked: Workers, workers: Collection[str]) -> tuple[dict[str, str], set[str]]:
