@@ -159,7 +159,7 @@ def read_object(url: str, most: int = MOST_BYTES) -> tuple[bytes, str]:
         return _repeated(fetch)
 
 
-def write_object(url: str, data: bytes, owner: str = "") -> None:
+def write_object(url: str, data: bytes, owner: str = "", mode: str = "overwrite") -> None:
     """Write an object, whole or not at all; an existing one is replaced. `owner` names who writes.
 
     Raises
@@ -167,7 +167,10 @@ def write_object(url: str, data: bytes, owner: str = "") -> None:
     OutputError
         The store does not take it.
     """
-    _put(url, data, "overwrite", {_OWNER: owner} if owner else None)
+    store, key = _open(url)
+    attributes = {_OWNER: owner} if owner else None
+    with _telling(url, "written", OutputError), waiting_for_network():
+        _repeated(lambda: store.put(key, data, mode=mode, attributes=attributes))
 
 
 def create_object(url: str, data: bytes, owner: str) -> bool:
@@ -175,7 +178,7 @@ def create_object(url: str, data: bytes, owner: str) -> bool:
     from obstore.exceptions import AlreadyExistsError
 
     try:
-        _put(url, data, "create", {_OWNER: owner})
+        write_object(url, data, owner, mode="create")
     except AlreadyExistsError:
         return object_owner(url) == owner
     return True
@@ -293,12 +296,6 @@ def _listed(store: Any, prefix: str | None) -> Iterator[Any]:
     while found := _repeated(page):
         yield from found
         last = found[-1]["path"]
-
-
-def _put(url: str, data: bytes, mode: str, attributes: dict[str, str] | None = None) -> None:
-    store, key = _open(url)
-    with _telling(url, "written", OutputError), waiting_for_network():
-        _repeated(lambda: store.put(key, data, mode=mode, attributes=attributes))
 
 
 @contextlib.contextmanager
