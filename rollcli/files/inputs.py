@@ -169,28 +169,29 @@ def _arguments(inputs: Iterable[str], files_from: str | None) -> Iterator[tuple[
     """Yield each argument, and whether it is literal: lists are, the command line may hold patterns."""
     for argument in inputs:
         if argument == "-":
-            yield from ((line, True) for line in _stdin_lines())
+            yield from ((line, True) for line in _listed_in("-"))
         else:
             yield argument, False
-    if files_from == "-":
-        yield from ((line, True) for line in _stdin_lines())
-    elif files_from is not None:
-        read = read_bytes if is_url(files_from) else read_given
-        with as_usage(), reading(files_from, _LIST):
-            data = as_utf8(read(files_from, most=MOST_LISTED), files_from)
-        yield from ((line, True) for line in _lines(data))
+    if files_from is not None:
+        yield from ((line, True) for line in _listed_in(files_from))
 
 
-def _stdin_lines() -> Iterator[str]:
-    if sys.stdin is None:
+def _listed_in(name: str) -> Iterator[str]:
+    """Yield the paths of a list: of a file, an object, or stdin ("-")."""
+    if name != "-":
+        read = read_bytes if is_url(name) else read_given
+        with as_usage(), reading(name, _LIST):
+            data = as_utf8(read(name, most=MOST_LISTED), name)
+    elif sys.stdin is None:
         raise UsageError("-: stdin is closed; nothing can be read from it")
-    data = read_stream(sys.stdin.buffer, "-", MOST_LISTED)
-    if data.startswith(_NO_TEXT):
-        raise UsageError(
-            "-: stands for a list of files on stdin, one a line; what came is an image or an archive: "
-            "name its file in place of -"
-        )
-    return _lines(as_utf8(data, "-"))
+    else:
+        data = as_utf8(read_stream(sys.stdin.buffer, "-", MOST_LISTED), "-")
+        if data.startswith(_NO_TEXT):
+            raise UsageError(
+                "-: stands for a list of files on stdin, one a line; what came is an image or an archive: "
+                "name its file in place of -"
+            )
+    return _lines(data)
 
 
 def _lines(data: bytes) -> Iterator[str]:
