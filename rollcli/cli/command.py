@@ -5,8 +5,8 @@ command that has such an option. Keys in a table, such as ``[estimate]`` or ``[e
 that command alone.
 """
 
-import dataclasses
 import functools
+import inspect
 import os
 import re
 import sys
@@ -212,7 +212,9 @@ def record(
     fields : class, optional
         Whose fields have the defaults; by default `make`.
     """
-    options, defaults = section(title, *declarations, only_with=only_with), _defaults(fields or make)
+    options = section(title, *declarations, only_with=only_with)
+    known = inspect.signature(fields or make).parameters.items()
+    defaults = {name: None if field.default is field.empty else field.default for name, field in known}
 
     def field_of(option: str) -> str:
         return f"{option}_deg" if f"{option}_deg" in defaults else option
@@ -236,14 +238,6 @@ def record(
         return gathered
 
     return declare
-
-
-def _defaults(record: Any) -> dict[str, Any]:
-    """Return the defaults of the fields of a named tuple or a dataclass; None where there is none."""
-    if dataclasses.is_dataclass(record):
-        known = {field.name: field.default for field in dataclasses.fields(record)}
-        return {name: None if value is dataclasses.MISSING else value for name, value in known.items()}
-    return dict(getattr(record, "_field_defaults", {}))
 
 
 def _declare(function: Callable[..., Any], declarations: Sequence[Declaration]) -> list[click.Parameter]:
