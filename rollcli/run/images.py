@@ -33,7 +33,7 @@ from rollcli.run.options import (
     HeightsOptions,
     VDisparityOptions,
 )
-from rollcli.run.outputs import image_paths, paths_of, roomy_path, write_outputs
+from rollcli.run.outputs import paths_of, possible_paths, roomy_path, write_outputs
 from rollcli.run.read import Source, guarded, read_source
 
 TOO_LARGE_FOR_PNG = f"written as TIFF: a disparity is above the {KITTI_TOP:.0f} px of a KITTI PNG"
@@ -69,8 +69,8 @@ class Pictured:
 def encode_images(frame: Frame, pictured: Pictured) -> tuple[dict[str, bytes], str]:
     """Make the images that were requested, by their paths, and what the row should say of them."""
     images, note = {}, ""
-    for kind, path in image_paths(frame, pictured.options.images):
-        planned = pictured.options.at(path)
+    for kind, paths in possible_paths(frame, pictured.options.images):
+        planned = pictured.options.at(paths[0])
         target, data = _ENCODERS[kind.name](planned, pictured)
         images[target] = data
         if target != planned:

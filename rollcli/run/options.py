@@ -39,17 +39,18 @@ class ImageKind(NamedTuple):
     holds: Literal["picture", "map", "as input", "numbers"]
     help: str
 
-    def ending(self, save_as: Save, *, computed: bool) -> str | None:
-        """Return the ending of its files, None for that of the input; `computed`: from a pair."""
-        if self.holds == "picture":
-            return ENDING_OF_FORMAT["png"]
-        if self.holds == "numbers":
-            return ENDING_OF_FORMAT["tiff" if save_as == "png" else save_as]
-        return None if self.holds == "as input" and not computed else ENDING_OF_FORMAT[save_as]
+    def endings(self, save_as: Save, *, computed: bool) -> tuple[str | None, ...]:
+        """Return the endings that its files may have, the usual one first; None for that of the input.
 
-    def can_overflow(self, save_as: Save, *, computed: bool) -> bool:
-        """Tell whether a TIFF takes its place where a KITTI PNG cannot hold the map."""
-        return computed and save_as == "png" and self.holds in ("map", "as input")
+        A TIFF takes the place of a KITTI PNG that cannot hold the map. `computed`: from a pair.
+        """
+        if self.holds == "picture":
+            return (ENDING_OF_FORMAT["png"],)
+        if self.holds == "numbers":
+            return (ENDING_OF_FORMAT["tiff" if save_as == "png" else save_as],)
+        if self.holds == "as input" and not computed:
+            return (None,)
+        return tuple(map(ENDING_OF_FORMAT.__getitem__, ("png", "tiff") if save_as == "png" else (save_as,)))
 
 
 KINDS = (

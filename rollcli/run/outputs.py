@@ -24,22 +24,16 @@ from rollcli.run.frame import Frame
 from rollcli.run.options import ENDING_OF_FORMAT, ConvertOptions, ImageKind, ImageOptions, RunningOptions
 
 
-def image_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[ImageKind, str]]:
-    """Yield (kind, path) of each image that is written for a frame."""
+def possible_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[ImageKind, list[str]]]:
+    """Yield the kind of each image of a frame, and the paths of which one is written, the usual one first."""
     for kind, folder in images.folders() if frame.relative else ():
-        yield kind, output_path(frame, folder, kind.ending(images.save_as, computed=bool(frame.right_file)))
+        endings = kind.endings(images.save_as, computed=bool(frame.right_file))
+        yield kind, [output_path(frame, folder, ending) for ending in endings]
 
 
 def roomy_path(path: str) -> str:
     """Name the TIFF that is written in place of a KITTI PNG which cannot hold the map."""
     return posixpath.splitext(path)[0] + ENDING_OF_FORMAT["tiff"]
-
-
-def possible_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[str, ...]]:
-    """Yield, for each image of a frame, the paths of which one is written."""
-    for kind, path in image_paths(frame, images):
-        overflows = kind.can_overflow(images.save_as, computed=bool(frame.right_file))
-        yield (path, roomy_path(path)) if overflows else (path,)
 
 
 def local_images(
@@ -66,7 +60,7 @@ def paths_of(frame: Frame, options: ConvertOptions) -> list[str]:
 
 def every_path(frame: Frame, images: ImageOptions, root: str = "") -> list[str]:
     """List every image that may be written for a frame, from a folder where relative paths start."""
-    return [located(root, path) for paths in possible_paths(frame, images) for path in paths]
+    return [located(root, path) for _, paths in possible_paths(frame, images) for path in paths]
 
 
 def write_outputs(

@@ -303,7 +303,7 @@ class KeptRows:
                     is_again = True
             if row.status != "error" and not is_again:
                 images = possible_paths(frame, self._images)
-                if not all(any(path in self._made for path in paths) for paths in images):
+                if not all(any(path in self._made for path in paths) for _, paths in images):
                     self.incomplete.append(frame)
         if row.status == "error":
             self.errors.append(self.count)
