@@ -63,6 +63,11 @@ def every_path(frame: Frame, images: ImageOptions, root: str = "") -> list[str]:
     return [located(root, path) for _, paths in possible_paths(frame, images) for path in paths]
 
 
+def images_of(frames: Iterable[Frame], images: ImageOptions) -> Iterator[str]:
+    """Yield every image that may be written for frames; a list of them would take most of our memory."""
+    return (path for frame in frames if images.folders() for path in every_path(frame, images))
+
+
 def write_outputs(
     files: Mapping[str, bytes], paths: Collection[str], *, replaces: bool, retry_of: str = ""
 ) -> None:
@@ -127,7 +132,7 @@ def _mark(data: bytes, result: str) -> bytes:
 
 def remove_marks(frames: Collection[Frame], images: ImageOptions) -> None:
     """Remove the marks beside the images of frames that were done again, and what killed workers left."""
-    paths = [path for frame in frames for path in every_path(frame, images)]
+    paths = list(images_of(frames, images))
     marks = [mark_path(path) for path in paths]
     remove_leftovers([*paths, *marks])
     remove_all(filter(is_url, marks))
@@ -135,7 +140,7 @@ def remove_marks(frames: Collection[Frame], images: ImageOptions) -> None:
 
 def remove_image_leftovers(frames: Iterable[Frame], images: ImageOptions) -> None:
     """Remove the temporary files that killed workers left beside the images of these frames."""
-    remove_leftovers(path for frame in frames for path in every_path(frame, images))
+    remove_leftovers(images_of(frames, images))
 
 
 _LISTED_AT_ONCE = 10_000

@@ -1,6 +1,6 @@
 """Decide and check what a run will read and write, before anything runs."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
@@ -19,6 +19,7 @@ from rollcli.run.outputs import (
     check_one_owner,
     check_places,
     every_path,
+    images_of,
 )
 from rollcli.run.result_file import inputs_path
 from rollcli.run.workers.chunks import Workers
@@ -76,18 +77,18 @@ def make_plan(options: EstimateOptions) -> Plan:
             "--update takes a result in one file of CSV or JSON Lines"
         )
     if options.images.folders():
-        check_one_owner(((frame, images_of([frame], options)) for frame in frames), plan.files)
+        check_one_owner(((frame, every_path(frame, options.images)) for frame in frames), plan.files)
     calibrations = calibration_files(options.calibration)
     check_inputs_are_kept(
         lambda: chain(calibrations, (path for frame in plan.frames for path in frame.reads())),
-        chain(plan.files, images_of(plan.frames, options)),
+        chain(plan.files, images_of(plan.frames, options.images)),
     )
     frames = _shard(frames, options.result)
     check_places(frames, [folder for _, folder in options.images.folders()])
     checked = options.calibration.given or options.pairs.side_by_side is not None
     notes = check_first_size(frames, options.frame) if checked else []
     if not (options.running.overwrite or options.result.resume):
-        check_nothing_is_there(images_of(frames, options))
+        check_nothing_is_there(images_of(frames, options.images))
     if plan.format == "parquet" and is_stream(plan.output):
         raise UsageError("Parquet is a folder of parts: name it with --output")
     further = further_columns(frames, options.result)
@@ -121,13 +122,6 @@ def _shard(frames: Sequence[Frame], options: ResultOptions) -> Sequence[Frame]:
     if options.shard_by == "range":
         return frames[(part - 1) * len(frames) // parts : part * len(frames) // parts]
     return frames[part - 1 :: parts]
-
-
-def images_of(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
-    """Yield every image that may be written; a list of them would take most of our memory."""
-    if not options.images.folders():
-        return iter(())
-    return (path for frame in frames for path in every_path(frame, options.images))
 
 
 def _find_frames(options: EstimateOptions) -> Sequence[Frame]:

@@ -31,8 +31,15 @@ from rollcli.run.options import (
     MethodOptions,
     RegionOptions,
 )
-from rollcli.run.outputs import Existing, check_nothing_is_there, local_images, possible_paths, remove_marks
-from rollcli.run.plan import Plan, images_of
+from rollcli.run.outputs import (
+    Existing,
+    check_nothing_is_there,
+    images_of,
+    local_images,
+    possible_paths,
+    remove_marks,
+)
+from rollcli.run.plan import Plan
 from rollcli.run.progress import RunSummary
 from rollcli.run.result_file import Inputs, data_of, row_lines
 from rollcli.stereo.options import StereoOptions
@@ -474,7 +481,7 @@ def _start_or_continue(record: RunRecord, plan: Plan, kept: KeptRows) -> None:
     if run is not None and _is_whole(run) and not any(_differences(kept, run, record.fixed, plan, 0)):
         record.continue_from(run)
     else:
-        check_nothing_is_there(images_of(plan.frames, plan.options))
+        check_nothing_is_there(images_of(plan.frames, plan.options.images))
 
 
 def _differences(
