@@ -5,7 +5,6 @@ import os
 import re
 import sys
 from array import array
-from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -73,7 +72,9 @@ def find_inputs(
         if repeats and len(found) == before and not literal:
             search.notes.append(f"{argument}: is named more than once; each of its files is taken once")
     if search.left_out:
-        search.notes.append(_left_out(search.left_out))
+        counts = search.left_out.most_common()
+        kinds = (f"{count} {ending or 'without an ending'}" for ending, count in counts)
+        search.notes.append(f"files in the folders that are not read: {listed(kinds, most=5)}")
         search.left_out.clear()
     del seen  # before the keys of the sort take its place
     if not any(is_url(each.location) or os.path.lexists(file_of(each.location)) for each in found):
@@ -81,11 +82,6 @@ def find_inputs(
         raise UsageError(f"no input found: {named + ': no such file' if named else 'the list is empty'}")
     found.sort(key=lambda each: natural_key(each.name))
     return found
-
-
-def _left_out(counts: Counter[str]) -> str:
-    kinds = (f"{count} {ending or 'without an ending'}" for ending, count in counts.most_common())
-    return f"files in the folders that are not read: {listed(kinds, most=5)}"
 
 
 def named_input(location: str) -> Input:

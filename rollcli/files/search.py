@@ -2,6 +2,7 @@
 
 import fnmatch
 import glob
+import itertools
 import os
 import posixpath
 import re
@@ -329,6 +330,4 @@ def _identity(folder: str | Path) -> tuple[int, int]:
 
 def _fixed_part(pattern: str) -> Path:
     """Find the folder before the first wildcard."""
-    parts = Path(pattern).parts
-    fixed = next((i for i, part in enumerate(parts) if glob.has_magic(part)), len(parts))
-    return Path(*parts[:fixed])
+    return Path(*itertools.takewhile(lambda part: not glob.has_magic(part), Path(pattern).parts))

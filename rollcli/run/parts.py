@@ -146,11 +146,8 @@ def open_parts(plan: Plan) -> Iterator[PartsOutput]:
     if plan.format == "parquet":
         require_parquet()
     check_parts(plan)
-    if is_url(plan.output):
+    with contextlib.nullcontext() if is_url(plan.output) else locked_folder(plan.output):
         yield _begin(plan)
-    else:
-        with locked_folder(plan.output):
-            yield _begin(plan)
 
 
 def _begin(plan: Plan) -> PartsOutput:

@@ -271,7 +271,6 @@ class DurableRows:
         self._rows: list[bytes] = []
         self._images: list[str] = []
         self._folders: set[Path] = set()  # whose names are on the disk
-        self._unsynced = False
         self._last, self._wait_s = time.monotonic(), 0.0
 
     def append(self, rows: Sequence[bytes], inputs: Sequence[bytes], images: Iterable[str]) -> None:
@@ -315,10 +314,8 @@ class DurableRows:
             self._images.clear()
         rows, self._rows = self._rows, []  # first: a commit after an interrupt must not write one again
         self._write(rows)
-        if self._unsynced:
-            self._inputs.sync()
-            self._file.sync()
-            self._unsynced = False
+        self._inputs.sync()
+        self._file.sync()
         self._last = time.monotonic()
         self._wait_s = min(_SHARE * (self._last - start), _LONGEST_S)
 
@@ -327,11 +324,9 @@ class DurableRows:
             self.commit()
 
     def _write(self, rows: Sequence[bytes]) -> None:
-        if not rows:
-            return
-        self._unsynced = True
-        self._file.append(b"".join(rows))
-        self.written += len(rows)
+        if rows:
+            self._file.append(b"".join(rows))
+            self.written += len(rows)
 
 
 _PART_ENDING = "inputs"
