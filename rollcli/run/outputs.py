@@ -98,10 +98,9 @@ def write_outputs(
     for path, data in files.items():
         write(path, data)
     if replaces:
-        for path in paths:
-            if path not in files:
-                with contextlib.suppress(OutputError):  # the row says what is wrong with the frame
-                    remove(path)
+        for path in set(paths) - files.keys():
+            with contextlib.suppress(OutputError):  # the row says what is wrong with the frame
+                remove(path)
 
 
 def _write_new(path: str, data: bytes) -> None:

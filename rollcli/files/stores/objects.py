@@ -272,10 +272,9 @@ def list_objects(url: str) -> Iterator[tuple[str, int, str]]:
 
 def has_objects(url: str) -> bool:
     """Return whether objects are seen below a prefix, which ends at a slash."""
-    try:
+    with contextlib.suppress(UsageError):  # who reads there says what is wrong
         return next(list_objects(url), None) is not None
-    except UsageError:  # who reads there says what is wrong
-        return False
+    return False
 
 
 def _listed(store: Any, prefix: str | None) -> Iterator[Any]:

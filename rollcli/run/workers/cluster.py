@@ -86,7 +86,6 @@ class ClusterExecutor(Generic[Task, Result]):
     """
 
     def __init__(self, given: str, work: Work[Task, Result], asked: Workers) -> None:
-        require_extra("cluster", "--scheduler")
         from distributed import KilledWorker
 
         self.worker_died: tuple[type[BaseException], ...] = (KilledWorker,)
