@@ -74,6 +74,8 @@ def reason_of(error: Exception) -> str:
     for code, meaning in _CODES.items():
         if f"<Code>{code}</Code>" in text:
             return meaning
+    if isinstance(error, FileNotFoundError):
+        return NO_OBJECT
     if any(each in text for each in _NO_KEYS):
         return "no keys are given; set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or the store's own"
     if _REDIRECT.search(text):
@@ -94,13 +96,6 @@ def reason_of(error: Exception) -> str:
 def _without_names(error: Exception) -> str:
     """Return what an error says without names of buckets and objects: hosts stay, and codes of answers."""
     return _ELEMENT.sub("", _PATH.sub(r"\1", str(error)))
-
-
-def what_is_missing(error: Exception) -> str:
-    """Tell a bucket that does not exist from an object."""
-    text = _without_names(error)
-    missing = any(f"<Code>{each}</Code>" in text for each in ("NoSuchBucket", "ContainerNotFound"))
-    return _NO_BUCKET if missing else NO_OBJECT
 
 
 def is_final(error: Exception) -> bool:
@@ -230,8 +225,6 @@ def _objection(ask: Callable[[], Any]) -> str:
 
     try:
         ask()
-    except FileNotFoundError as error:
-        return what_is_missing(error)
     except (BaseError, OSError, RuntimeError) as error:
         return reason_of(error)
     return ""
@@ -306,13 +299,11 @@ def _telling(url: str, done: str, error: type[RollcliError], limits: str = "") -
         yield
     except AlreadyExistsError:  # an answer, not a fault
         raise
-    except FileNotFoundError as missing:
-        reason = what_is_missing(missing)
-        raise error(f"{public_name(url)}: {reason}", reason) from None
     except (BaseError, OSError, RuntimeError) as fault:
         reason = reason_of(fault)
+        cannot = "" if isinstance(fault, FileNotFoundError) else f"cannot be {done}: "
         more = limits if reason == _TOO_LONG else ""
-        raise error(f"{public_name(url)}: cannot be {done}: {reason}{more}", reason) from None
+        raise error(f"{public_name(url)}: {cannot}{reason}{more}", reason) from None
 
 
 def _repeated(fetch: Callable[[], Value]) -> Value:
