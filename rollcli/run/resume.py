@@ -82,7 +82,8 @@ class RunRecord:
         self._begun = False
         # older images, now and after a resume
         self.replaces = options.running.overwrite or options.result.update
-        self.fixed = {"rollcli": __version__, "options": _effective(plan), "inputs": names_of(plan.frames)}
+        inputs = names_of(plan.frames)
+        self.fixed = dict[str, Any](rollcli=__version__, options=_effective(plan), inputs=inputs)
         if options.calibration.given:
             self.fixed["calibration"] = _calibrations(plan.frames)
 
@@ -433,68 +434,46 @@ def new_record(plan: Plan, kept: KeptRows) -> RunRecord:
         It cannot be continued; says what differs. Or it is a first start, and there are images already.
     """
     record = RunRecord(plan)
-    if not kept.count:
-        if plan.options.result.resume:
-            _start_or_continue(record, plan, kept)
+    if not (kept.count or plan.options.result.resume):
         return record
     try:
         earlier = read_run(plan.output)
+        found = next(_differences(kept, earlier, record), "")
     except InputError as error:
-        raise not_resumable(plan.output, str(error)) from error
-    if earlier is None:
-        raise not_resumable(plan.output, f"there is no {base_name(run_path(plan.output))}")
-    if not _is_whole(earlier):
-        raise not_resumable(plan.output, f"{base_name(run_path(plan.output))} is damaged")
-    if plan.options.result.update:
-        found = differences(earlier, record.fixed)
-    else:
-        begun = begun_plan(plan, earlier)
-        same = record if begun is plan else RunRecord(begun)
-        found = _differences(kept, earlier, same.fixed, begun, len(plan.frames) - len(begun.frames))
-    for difference in found:
-        raise not_resumable(plan.output, difference)
-    record.continue_from(earlier)
+        found = str(error)
+    if found and kept.count:
+        raise not_resumable(plan.output, found)
+    if found:
+        check_nothing_is_there(images_of(plan.frames, plan.options.images))  # those of another run
+    elif earlier is not None:
+        record.continue_from(earlier)
     return record
 
 
-def begun_plan(plan: Plan, run: Mapping[str, Any] | None) -> Plan:
-    """Return the plan without the frames that have been added since a run began, if these sort last."""
-    inputs = (run or {}).get("inputs")
-    count = inputs.get("frames") if isinstance(inputs, dict) else None
-    if not isinstance(count, int) or not 0 < count < len(plan.frames):
-        return plan
-    return replace(plan, frames=plan.frames[:count])
-
-
-def _start_or_continue(record: RunRecord, plan: Plan, kept: KeptRows) -> None:
-    """Find out what a resume without rows is: a first start, or the same run, which had got no further.
-
-    Raises
-    ------
-    UsageError
-        A first start, and there are images: they belong to another run.
-    """
-    try:
-        run = read_run(plan.output)
-    except InputError:
-        run = None
-    if run is not None and _is_whole(run) and not any(_differences(kept, run, record.fixed, plan, 0)):
-        record.continue_from(run)
-    else:
-        check_nothing_is_there(images_of(plan.frames, plan.options.images))
-
-
-def _differences(
-    kept: KeptRows, was: Mapping[str, Any], now: Mapping[str, Any], plan: Plan, added: int
-) -> Iterator[str]:
+def _differences(kept: KeptRows, was: Mapping[str, Any] | None, record: RunRecord) -> Iterator[str]:
+    """Yield what keeps a run with this record from being continued by another one, in words."""
+    plan, now = record.plan, record.fixed
+    if was is None:
+        yield f"there is no {base_name(run_path(plan.output))}"
+        return
+    if not _is_whole(was):
+        yield f"{base_name(run_path(plan.output))} is damaged"
+        return
     yield from differences(was, now)
+    if plan.options.result.update:
+        return
+    frames, count = plan.frames, was["inputs"].get("frames")
+    grown = isinstance(count, int) and 0 < count < len(frames)
+    if grown:  # what has been added sorts last, or the names differ
+        frames = frames[:count]
+        now = RunRecord(replace(plan, frames=frames)).fixed
     if was.get("calibration") != json.loads(json.dumps(now.get("calibration"))):
         yield "the calibration differs"
-    hint = "; new frames must sort last, or be added by --update" if added else ""
+    hint = "; new frames must sort last, or be added by --update" if grown else ""
     if kept.mismatch:
         yield f"the inputs differ: {kept.mismatch}{hint}"
-    if kept.count > len(plan.frames):
-        yield f"it has {kept.count} rows, and there are {len(plan.frames)} frames"
+    if kept.count > len(frames):
+        yield f"it has {kept.count} rows, and there are {len(frames)} frames"
     inputs_was, inputs_now = was["inputs"], now["inputs"]
     if inputs_was.get("frames") != inputs_now["frames"]:
         yield f"it was begun with {inputs_was.get('frames')} frames, now there are {inputs_now['frames']}"
