@@ -1,6 +1,7 @@
 """The options of `estimate` and of the conversions. Import-light: the command line loads it for its help."""
 
 import math
+import posixpath
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -218,6 +219,10 @@ class FrameOptions(NamedTuple):
         return located(self.root, path)
 
 
+Form = Literal["csv", "jsonl", "parquet"]
+_FORM_OF_ENDING: dict[str, Form] = {".jsonl": "jsonl", ".ndjson": "jsonl", ".parquet": "parquet"}
+
+
 class ResultOptions(NamedTuple):
     """Where the rows go, and which frames they are of.
 
@@ -226,7 +231,7 @@ class ResultOptions(NamedTuple):
     """
 
     output: str = "-"
-    format: Literal["csv", "jsonl", "parquet"] | None = None
+    format: Form | None = None
     resume: bool = False
     update: bool = False
     retry_failed: bool = False
@@ -237,14 +242,10 @@ class ResultOptions(NamedTuple):
     part_rows: int = 1000
 
     @property
-    def form(self) -> Literal["csv", "jsonl", "parquet"]:
+    def form(self) -> Form:
         """The format of the rows: the one given, else by the ending of the output."""
-        if self.format is not None:
-            return self.format
-        lower = self.output.lower().rstrip("/")
-        if lower.endswith((".jsonl", ".ndjson")):
-            return "jsonl"
-        return "parquet" if lower.endswith(".parquet") else "csv"
+        ending = posixpath.splitext(self.output.lower().rstrip("/"))[1]
+        return self.format or _FORM_OF_ENDING.get(ending, "csv")
 
 
 class EstimateOptions(NamedTuple):

@@ -265,8 +265,7 @@ def run_rig(options: RigOptions) -> int:
         sources.append(later)
         missing, after = missing or later.missing, _assessed(later, options)
         changes = {each.name: difference(rig.now(each), after.now(each)) for each in QUANTITIES}
-    given = options.calibration
-    health = health_of(rig, Calibrations(given).of(rig.frames.files[-1]) if given.given else None)
+    health = health_of(rig, Calibrations(options.calibration).of(rig.frames.files[-1]))
     checks = run_checks(rig, options.gates, missing, changes.get(ROLL.name), health)
     found = Findings(rig, checks, after, changes, health)
     overwrite = options.running.overwrite
