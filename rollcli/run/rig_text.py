@@ -214,8 +214,8 @@ def _lines(found: Findings) -> Iterator[str]:
         yield f"jumps   {len(jumps) or ('none' if told else 'too few frames to tell')}"
     yield from (f"        {line}" for line in jumps)
     yield from _segment_lines(rig)
-    for name, change in found.changes.items():
-        yield from _moved(name, change)
+    for quantity in QUANTITIES if found.changes else ():
+        yield from _moved(quantity, found.changes[quantity.name])
     if found.health is not None:
         yield from found.health.lines()
     sentences = findings(rig, roll=False)
@@ -241,13 +241,13 @@ def _segment_lines(rig: RigAssessment) -> Iterator[str]:
         yield f"and {len(rows) - _SEGMENTS_SHOWN:,} more segments; --format csv lists all"
 
 
-def _moved(name: str, change: Estimate) -> Iterator[str]:
+def _moved(quantity: Quantity, change: Estimate) -> Iterator[str]:
     """Whether the rig has moved from one result to the other."""
     if change.value is None:
         return
-    quantity = next(each for each in QUANTITIES if each.name == name)
     told = {True: "it has moved", False: "no move is seen", None: "too few frames for an interval"}
-    yield f"{name} against the other result: {answer(change, quantity, change=True)}, {told[moved(change)]}"
+    said = answer(change, quantity, change=True)
+    yield f"{quantity.name} against the other result: {said}, {told[moved(change)]}"
 
 
 _CALL = (
