@@ -129,7 +129,7 @@ class Search:
 
     def __post_init__(self) -> None:
         self._skip = {os.path.realpath(folder) for folder in self.skip if not is_url(folder)}
-        self._skipped_urls = [folder.rstrip("/") for folder in self.skip if is_url(folder)]
+        self._skipped_urls = tuple(f"{folder.rstrip('/')}/" for folder in self.skip if is_url(folder))
 
     def files(self, argument: str, *, literal: bool = False) -> Iterator[tuple[str, str]]:
         """Yield each file of `argument`, and its path below the folder or pattern.
@@ -259,11 +259,9 @@ class Search:
         if not pattern and (literal or not is_folder_url(url)):
             return iter([(url, base_name(url))])
         found = objects_behind(url, recursive=self.recursive)
-        readable = ((each, below) for each, below in found if self._reads(each) and not self._skips(each))
+        wanted = (each for each in found if not each[0].startswith(self._skipped_urls))
+        readable = ((each, below) for each, below in wanted if self._reads(each))
         return self._wanted(url, readable, "pattern" if pattern else "folder")
-
-    def _skips(self, url: str) -> bool:
-        return any(url.startswith(f"{folder}/") for folder in self._skipped_urls)
 
     def _reads(self, name: str) -> bool:
         return name.lower().endswith(self.endings)

@@ -3,7 +3,6 @@
 import contextlib
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import cache
 from pathlib import Path, PurePath, PurePosixPath
 from typing import TYPE_CHECKING, NamedTuple, overload
@@ -393,14 +392,11 @@ def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
 
 
 def _bag_frames(bags: "Iterable[BagFrames]", make: "_FrameMaker") -> list[Frame]:
-    frames = []
+    frames: list[Frame] = []
     for bag in bags:
         if not make.quiet:
             say(*dict.fromkeys(bag.notes))
-        for left, right in bag.frames:
-            frame = make.frame(left, right)
-            given = make.calibrations.given
-            frames.append(frame if given else replace(frame, calibration=bag.calibration))
+        frames += [make.frame(left, right, bag.calibration) for left, right in bag.frames]
     return frames
 
 
@@ -417,8 +413,8 @@ class _FrameMaker:
         elif self._mask is not None and not (is_url(self._mask) or is_file(self._mask)):
             raise UsageError(f"{self._mask}: no such mask file or folder")
 
-    def frame(self, left: Input, right: Input | None = None) -> Frame:
-        """Make the frame of a map, or of the views of a pair."""
+    def frame(self, left: Input, right: Input | None = None, calibration: Calibration | None = None) -> Frame:
+        """Make the frame of a map, or of the views of a pair; `calibration` is that of its bag."""
         mask, stem = self._mask, PurePath(frame_name(left.name)).stem
         if self._masks is not None and (mask := self._masks.get(stem)) is None:
             raise UsageError(f"{left.name}: has no mask of its name in {self._mask}")
@@ -431,5 +427,5 @@ class _FrameMaker:
             right_path=right.location if right else "",
             relative=left.relative if not foreign or names_a_file(left.relative) else "",
             mask=mask,
-            calibration=self.calibrations.of(left.name),
+            calibration=self.calibrations.of(left.name) or calibration,
         )

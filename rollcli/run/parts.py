@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 
 from rollcli.errors import InputError, UsageError
+from rollcli.extras import require_extra
 from rollcli.files.atomic import is_folder, is_there, remove_leftovers, sync_files
 from rollcli.files.locking import locked_folder, not_resumable
 from rollcli.files.results import (
@@ -21,7 +22,6 @@ from rollcli.files.results import (
     part_name,
     part_names,
     read_parts,
-    require_parquet,
     run_path,
 )
 from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
@@ -144,7 +144,7 @@ def open_parts(plan: Plan) -> Iterator[PartsOutput]:
         The folder cannot be written.
     """
     if plan.format == "parquet":
-        require_parquet()
+        require_extra("parquet", "Parquet")  # before any work
     check_parts(plan)
     with contextlib.nullcontext() if is_url(plan.output) else locked_folder(plan.output):
         yield _begin(plan)
