@@ -94,7 +94,7 @@ class FileOutput(RecordedOutput):
         self._rows.append(batch.lines, batch.notes, images)
 
     def _keep_images(self, images: Iterable[str]) -> None:
-        self._rows.restore(images)
+        self._rows.append((), (), images)
 
     def commit(self) -> None:
         """Force the images and rows that were added to the disk."""

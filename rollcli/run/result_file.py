@@ -276,6 +276,8 @@ class DurableRows:
     def append(self, rows: Sequence[bytes], inputs: Sequence[bytes], images: Iterable[str]) -> None:
         """Add rows, the lines of their inputs, and the images that must be on the disk before them.
 
+        There may be images alone, whose rows are in the result already.
+
         Raises
         ------
         OutputError
@@ -287,18 +289,8 @@ class DurableRows:
             self._rows.extend(rows)
         else:
             self._write(rows)
-        self._commit_in_time()
-
-    def restore(self, images: Iterable[str]) -> None:
-        """Add images whose row is in the result already.
-
-        Raises
-        ------
-        OutputError
-            The disk does not take an image or a row.
-        """
-        self._images.extend(images)
-        self._commit_in_time()
+        if time.monotonic() - self._last >= self._wait_s or len(self._images) >= _MOST_IMAGES:
+            self.commit()
 
     def commit(self) -> None:
         """Force everything to the disk that was added.
@@ -318,10 +310,6 @@ class DurableRows:
         self._file.sync()
         self._last = time.monotonic()
         self._wait_s = min(_SHARE * (self._last - start), _LONGEST_S)
-
-    def _commit_in_time(self) -> None:
-        if time.monotonic() - self._last >= self._wait_s or len(self._images) >= _MOST_IMAGES:
-            self.commit()
 
     def _write(self, rows: Sequence[bytes]) -> None:
         if rows:
