@@ -269,12 +269,7 @@ class Chunk(Generic[Task, Result]):
         self._attempts: Iterable[tuple[Result, ...]] = map(self._attempt, tasks)
         if threads is not None:
             futures = [threads.submit(self._attempt_in_turn, task) for task in tasks]
-            self._all_begun = threads.submit(lambda: None)  # begins after them
             self._attempts = (future.result() for future in futures)
-
-    def wait_until_begun(self) -> None:
-        """Wait until all the tasks have begun in their threads."""
-        self._all_begun.result()
 
     def done(self) -> Done[Result]:
         """Wait for the end of the chunk; return what was done of it."""

@@ -280,7 +280,7 @@ def _do_chunk(version: str, run: str, told: bytes, threads: int) -> bytes:
     if pool is not None:
         from distributed import secede
 
-        chunk.wait_until_begun()
+        pool.submit(lambda: None).result()  # which begins after all the tasks
         secede()
     return pickle.dumps(chunk.done(), pickle.HIGHEST_PROTOCOL)
 
