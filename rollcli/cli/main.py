@@ -149,18 +149,17 @@ def _versions() -> Iterator[tuple[str, str]]:
 
     yield "rollcli", __version__
     yield "Python", f"{platform.python_version()} ({platform.python_implementation()}, {platform.platform()})"
-    requirements, seen = list[str](), set[str]()
+    requirements, found = list[str](), dict[str, tuple[str, str]]()
     with contextlib.suppress(metadata.PackageNotFoundError):  # it may run from its folder, not installed
         requirements = metadata.requires("rollcli") or []
     for requirement in requirements:
         name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
-        found: tuple[str, str] | None = None
-        for package in _OPENCV[::-1] if name in _OPENCV else (name,):  # several that hold the same module
+        for package in _OPENCV if name in _OPENCV else (name,):  # several that hold the same module
             with contextlib.suppress(metadata.PackageNotFoundError):
-                found = package, metadata.version(package)
-        if name not in seen and (found or ";" not in requirement):
-            yield found or (name, "not installed")
-        seen.add(name)
+                found.setdefault(name, (package, metadata.version(package)))
+        if ";" not in requirement:
+            found.setdefault(name, (name, "not installed"))
+    yield from found.values()
 
 
 @click.group(
