@@ -142,22 +142,14 @@ class Chunks(Generic[Task]):
         Chunks get smaller towards the end.
     first : int
         The size of the first ones.
-    unit : int
-        See `Work`.
-    prepare : callable, optional
-        See `Work`.
+    work : Work
+        Which tasks belong together, and whether they are prepared one by one.
     """
 
-    def __init__(
-        self,
-        tasks: Sequence[Task],
-        first: int = 1,
-        unit: int = 1,
-        prepare: Callable[[Task], Task] | None = None,
-    ) -> None:
+    def __init__(self, tasks: Sequence[Task], first: int, work: Work[Task, Any]) -> None:
         self._count = len(tasks)
-        self._tasks = iter(tasks) if prepare is None else map(prepare, tasks)
-        self._first, self._unit, self._one_by_one = first, unit, prepare is not None
+        self._tasks = iter(tasks) if work.prepare is None else map(work.prepare, tasks)
+        self._first, self._unit, self._one_by_one = first, work.unit, work.prepare is not None
         self._seconds, self._done, self._taken = _DOUBT_S, 0.0, 0
 
     def take(self, workers: int, told: Any = None) -> Span[Task]:
