@@ -96,14 +96,12 @@ class Command(click.Command):
         self,
         *args: Any,
         examples: Sequence[tuple[str, str]] = (),
-        statuses: Mapping[ExitStatus, str] | None = None,
+        statuses: Mapping[ExitStatus, str] = _OF_FRAMES,
         **attributes: Any,
     ) -> None:
         super().__init__(*args, **attributes)
         self.examples = tuple(examples)
-        own = _OF_FRAMES if statuses is None else statuses
-        meant = {**{each: each.meaning for each in _ALWAYS}, **own}
-        self.statuses = {each: meant[each] for each in sorted(meant)}
+        self.statuses = dict(sorted({**{each: each.meaning for each in _ALWAYS}, **statuses}.items()))
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the words, with the values that options have by themselves."""
