@@ -32,6 +32,7 @@ DOORS = {
     "rollcli.run.options": "the command line's help needs no URLs",
     "rollcli.run.read": "loads OpenCV's matcher only for pairs",
     "rollcli.run.result_rows": "estimates maps, which loads NumPy, only of other folders than the rows'",
+    "rollcli.run.plan": "decodes videos in place of the workers, which loads OpenCV",
     "rollcli.run.progress": "loads NumPy only at the end of a run, to tell the rig's roll",
     "rollcli.run.workers.pool": "a worker's door",
     "rollcli.run.workers.tasks": "loads the executor that is used; the cluster is an extra",

@@ -5,12 +5,12 @@ command that has such an option. Keys in a table, such as ``[estimate]`` or ``[e
 that command alone.
 """
 
-import dataclasses
 import functools
+import inspect
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import click
@@ -96,14 +96,12 @@ class Command(click.Command):
         self,
         *args: Any,
         examples: Sequence[tuple[str, str]] = (),
-        statuses: Mapping[ExitStatus, str] | None = None,
+        statuses: Mapping[ExitStatus, str] = _OF_FRAMES,
         **attributes: Any,
     ) -> None:
         super().__init__(*args, **attributes)
         self.examples = tuple(examples)
-        own = _OF_FRAMES if statuses is None else statuses
-        meant = {**{each: each.meaning for each in _ALWAYS}, **own}
-        self.statuses = {each: meant[each] for each in sorted(meant)}
+        self.statuses = dict(sorted({**{each: each.meaning for each in _ALWAYS}, **statuses}.items()))
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the words, with the values that options have by themselves."""
@@ -212,7 +210,9 @@ def record(
     fields : class, optional
         Whose fields have the defaults; by default `make`.
     """
-    options, defaults = section(title, *declarations, only_with=only_with), _defaults(fields or make)
+    options = section(title, *declarations, only_with=only_with)
+    known = inspect.signature(fields or make).parameters.items()
+    defaults = {name: None if field.default is field.empty else field.default for name, field in known}
 
     def field_of(option: str) -> str:
         return f"{option}_deg" if f"{option}_deg" in defaults else option
@@ -236,14 +236,6 @@ def record(
         return gathered
 
     return declare
-
-
-def _defaults(record: Any) -> dict[str, Any]:
-    """Return the defaults of the fields of a named tuple or a dataclass; None where there is none."""
-    if dataclasses.is_dataclass(record):
-        known = {field.name: field.default for field in dataclasses.fields(record)}
-        return {name: None if value is dataclasses.MISSING else value for name, value in known.items()}
-    return dict(getattr(record, "_field_defaults", {}))
 
 
 def _declare(function: Callable[..., Any], declarations: Sequence[Declaration]) -> list[click.Parameter]:
@@ -290,34 +282,33 @@ _SETTINGS = ("ROLLCLI_STORE_TIMEOUT",)  # of no command
 def _tell_mistaken_variables(ctx: click.Context) -> None:
     """Say which variables name no option of this command, no other command and no setting."""
     of_command = f"{ctx.auto_envvar_prefix}_"
-    known = [f"{of_command}{str(param.name).upper()}" for param in ctx.command.params]
+    options = [f"{of_command}{str(param.name).upper()}" for param in ctx.command.params]
     root = ctx.find_root()
     assert isinstance(root.command, click.Group)
     commands = tuple(f"{_PROGRAM}{name.upper()}_" for name in root.command.list_commands(root))
-    for name in sorted(os.environ):
-        if not name.startswith(_PROGRAM) or name in (*known, *_SETTINGS):
-            continue
-        if name.startswith(of_command):
-            _tell_mistaken(name, f"there is no such option of {ctx.command_path}", known, of_command)
-        elif not name.startswith(commands):
-            _tell_mistaken(name, "there is no such command or setting", [*known, *_SETTINGS], _PROGRAM)
+    mistaken = {name for name in os.environ if name.startswith(_PROGRAM)} - {*options, *_SETTINGS}
+    for name in sorted(mistaken):
+        same, known, what = of_command, options, f"there is no such option of {ctx.command_path}"
+        if not name.startswith(of_command):
+            same, known, what = _PROGRAM, [*options, *_SETTINGS], "there is no such command or setting"
+        if same == of_command or not name.startswith(commands):
+            rest = {each.removeprefix(same): each for each in known}
+            close = nearest(name.removeprefix(same), rest)
+            say(f"{name}: {what}" + (f"; did you mean {rest[close]}?" if close else ""))
 
 
-def _tell_mistaken(name: str, what: str, known: list[str], same: str) -> None:
+def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str:
+    """Return which known word is the most like a mistaken one; empty where none is."""
     import difflib  # only here: it takes a while to load
 
-    rest = {each.removeprefix(same): each for each in known}
-    close = difflib.get_close_matches(name.removeprefix(same), rest, n=1)
-    say(f"{name}: {what}" + (f"; did you mean {rest[close[0]]}?" if close else ""))
+    return next(iter(difflib.get_close_matches(word, known, n=1, cutoff=cutoff)), "")
 
 
 def _use(ctx: click.Context, param: click.Parameter, path: str | None) -> None:
     """Make the file's values the defaults of this command."""
     if path is None:
         return
-    commands = _commands(ctx)
-    options = _options(ctx.command)
-    defaults = {}
+    commands, options, defaults = _commands(ctx), _options(ctx.command), {}
     for words, values in _tables(_load(path)):
         if words and values and " ".join(words) not in commands:
             raise click.UsageError(f"{path}: there is no command for the table [{'.'.join(words)}]", ctx)
@@ -328,7 +319,9 @@ def _use(ctx: click.Context, param: click.Parameter, path: str | None) -> None:
             if name in options:
                 defaults[name] = _checked(ctx, options[name], value, path)
             elif words or not any(name in _options(each) for each in commands.values()):
-                raise click.UsageError(f"{path}: there is no option {key!r}{_nearest(name, options)}", ctx)
+                close = nearest(name, options, cutoff=0).replace("_", "-")
+                hint = f"; the nearest is {close!r}" if close else ""
+                raise click.UsageError(f"{path}: there is no option {key!r}{hint}", ctx)
     ctx.default_map = {**(ctx.default_map or {}), **defaults}
 
 
@@ -342,9 +335,8 @@ def _tables(values: dict[str, Any], words: tuple[str, ...] = ()) -> Iterator[tup
 
 def _options(command: click.Command) -> dict[str, click.Option]:
     """Return what a file may set, by the names of parameters."""
-    found = {str(each.name): each for each in command.params if isinstance(each, click.Option)}
-    found.pop("config", None)
-    return found
+    options = (each for each in command.params if isinstance(each, click.Option) and each.expose_value)
+    return {str(each.name): each for each in options}
 
 
 def _commands(ctx: click.Context) -> dict[str, click.Command]:
@@ -384,13 +376,6 @@ def _load(path: str) -> dict[str, Any]:
         raise click.UsageError(str(error)) from error
     except (ValueError, RecursionError) as error:  # TOML, UTF-8, numbers of thousands of digits
         raise click.UsageError(f"{path}: is not TOML: {error}") from error
-
-
-def _nearest(name: str, options: dict[str, click.Option]) -> str:
-    import difflib
-
-    close = difflib.get_close_matches(name, options, n=1, cutoff=0)
-    return f"; the nearest is {close[0].replace('_', '-')!r}" if close else ""
 
 
 def _checked(ctx: click.Context, declared: click.Option, value: Any, path: str) -> Any:

@@ -40,14 +40,11 @@ def one_start(ctx: click.Context, *, resume: bool, overwrite: bool) -> tuple[boo
     """
     if not (resume and overwrite):
         return resume, overwrite
-    to_resume, to_update, to_overwrite = (_distance(ctx, name) for name in ("resume", "update", "overwrite"))
+    near: dict[ParameterSource | None, int] = {each: place for place, each in enumerate(_NEAREST_FIRST)}
+    sources = map(ctx.get_parameter_source, ("resume", "update", "overwrite"))
+    to_resume, to_update, to_overwrite = (near.get(source, len(near)) for source in sources)
     to_resume = min(to_resume, to_update)
     return to_resume <= to_overwrite, to_overwrite <= to_resume
-
-
-def _distance(ctx: click.Context, name: str) -> int:
-    source = ctx.get_parameter_source(name)
-    return _NEAREST_FIRST.index(source) if source in _NEAREST_FIRST else len(_NEAREST_FIRST)
 
 
 def resume_command(ctx: click.Context) -> str:

@@ -49,10 +49,10 @@ class LazyGroup(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if args and not args[0].startswith("-") and args[0] not in COMMANDS:
-            import difflib
+            from rollcli.cli.command import nearest  # nothing else needs it at each start
 
-            close = difflib.get_close_matches(args[0].lower(), COMMANDS, n=1)
-            hint = f"; did you mean {close[0]!r}?" if close else f"; commands: {', '.join(COMMANDS)}"
+            close = nearest(args[0].lower(), COMMANDS)
+            hint = f"; did you mean {close!r}?" if close else f"; commands: {', '.join(COMMANDS)}"
             raise click.UsageError(f"there is no command {args[0]!r}{hint}", ctx)
         return super().resolve_command(ctx, args)
 
@@ -149,18 +149,17 @@ def _versions() -> Iterator[tuple[str, str]]:
 
     yield "rollcli", __version__
     yield "Python", f"{platform.python_version()} ({platform.python_implementation()}, {platform.platform()})"
-    requirements, seen = list[str](), set[str]()
+    requirements, found = list[str](), dict[str, tuple[str, str]]()
     with contextlib.suppress(metadata.PackageNotFoundError):  # it may run from its folder, not installed
         requirements = metadata.requires("rollcli") or []
     for requirement in requirements:
         name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
-        found: tuple[str, str] | None = None
-        for package in _OPENCV[::-1] if name in _OPENCV else (name,):  # several that hold the same module
+        for package in _OPENCV if name in _OPENCV else (name,):  # several that hold the same module
             with contextlib.suppress(metadata.PackageNotFoundError):
-                found = package, metadata.version(package)
-        if name not in seen and (found or ";" not in requirement):
-            yield found or (name, "not installed")
-        seen.add(name)
+                found.setdefault(name, (package, metadata.version(package)))
+        if ";" not in requirement:
+            found.setdefault(name, (name, "not installed"))
+    yield from found.values()
 
 
 @click.group(

@@ -156,11 +156,7 @@ stereo_options = record(
         Number("PX", at_least=0, whole=True),
         "Drop patches of up to this many pixels; 0: keep all.",
     ),
-    option(
-        "--speckle-range",
-        Number("PX", at_least=0, whole=True),
-        "Disparity step within a patch, pixels.",
-    ),
+    option("--speckle-range", Number("PX", at_least=0, whole=True), "Disparity step within a patch, pixels."),
     option(
         "--downscale",
         Number("F", at_least=1),
@@ -279,11 +275,7 @@ method_options = record(
         "An angle is suspect when the half-width of its 95 % interval is above this, or when noise and "
         "unevenness alone make 0.45 of this, degrees.",
     ),
-    option(
-        "--seed",
-        Number("INT", at_least=0, whole=True),
-        "Seed of road finding's samples.",
-    ),
+    option("--seed", Number("INT", at_least=0, whole=True), "Seed of road finding's samples."),
 )
 
 

@@ -236,9 +236,12 @@ def _point(value: Any) -> tuple[float, float]:
     return u, v
 
 
+_FAR = 1_000_000  # pixels; OpenCV goes through every row of a polygon, also those outside of the map
+
+
 def _polygon(value: Any) -> tuple[tuple[float, float], ...]:
     corners = tuple(map(_point, value.split() if isinstance(value, str) else value))
-    _require(len(corners) >= 3)
+    _require(len(corners) >= 3 and max(abs(each) for corner in corners for each in corner) <= _FAR)
     return corners
 
 
@@ -264,7 +267,11 @@ WIDE_SPAN = Parsed("A:B", _wide_span, "A:B with A < B, such as -0.1:0.1")
 ANY_NUMBER = Parsed("VALUE", _any_number, "a number")  # that a pixel may hold: also nan and inf
 ROI = Parsed("X0,Y0,X1,Y1", _roi, "X0,Y0,X1,Y1 in whole pixels with X0 < X1 and Y0 < Y1")
 POINT = Parsed("CX,CY", _point, "CX,CY in pixels, such as 609.6,172.9")
-POLYGON = Parsed("'X,Y X,Y X,Y …'", _polygon, "three or more corners such as '0,375 600,180 1242,375'")
+POLYGON = Parsed(
+    "'X,Y X,Y X,Y …'",
+    _polygon,
+    "three or more corners such as '0,375 600,180 1242,375', within a million pixels",
+)
 SHARD = Parsed("I/N", _shard, "I/N with I from 1 to N, such as 2/8", "/")
 TURNS = Parsed(  # at most 1000 angles
     "A:B:STEP", _turns, "A:B:STEP in degrees with -90 <= A <= B <= 90, such as -20:20:2", ":"

@@ -6,7 +6,6 @@ import os
 import re
 import sys
 from array import array
-from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -74,7 +73,9 @@ def find_inputs(
         if repeats and len(found) == before and not literal:
             search.notes.append(f"{argument}: is named more than once; each of its files is taken once")
     if search.left_out:
-        search.notes.append(_left_out(search.left_out))
+        counts = search.left_out.most_common()
+        kinds = (f"{count} {ending or 'without an ending'}" for ending, count in counts)
+        search.notes.append(f"files in the folders that are not read: {listed(kinds, most=5)}")
         search.left_out.clear()
     del seen  # before the keys of the sort take its place
     if not any(is_url(each.location) or os.path.lexists(file_of(each.location)) for each in found):
@@ -82,11 +83,6 @@ def find_inputs(
         raise UsageError(f"no input found: {named + ': no such file' if named else 'the list is empty'}")
     found.sort(key=lambda each: natural_key(each.name))
     return found
-
-
-def _left_out(counts: Counter[str]) -> str:
-    kinds = (f"{count} {ending or 'without an ending'}" for ending, count in counts.most_common())
-    return f"files in the folders that are not read: {listed(kinds, most=5)}"
 
 
 def named_input(location: str) -> Input:
@@ -170,28 +166,29 @@ def _arguments(inputs: Iterable[str], files_from: str | None) -> Iterator[tuple[
     """Yield each argument, and whether it is literal: lists are, the command line may hold patterns."""
     for argument in inputs:
         if argument == "-":
-            yield from ((line, True) for line in _stdin_lines())
+            yield from ((line, True) for line in _listed_in("-"))
         else:
             yield argument, False
-    if files_from == "-":
-        yield from ((line, True) for line in _stdin_lines())
-    elif files_from is not None:
-        read = read_bytes if is_url(files_from) else read_given
-        with as_usage(), reading(files_from, _LIST):
-            data = as_utf8(read(files_from, most=MOST_LISTED), files_from)
-        yield from ((line, True) for line in _lines(data))
+    if files_from is not None:
+        yield from ((line, True) for line in _listed_in(files_from))
 
 
-def _stdin_lines() -> Iterator[str]:
-    if sys.stdin is None:
+def _listed_in(name: str) -> Iterator[str]:
+    """Yield the paths of a list: of a file, an object, or stdin ("-")."""
+    if name != "-":
+        read = read_bytes if is_url(name) else read_given
+        with as_usage(), reading(name, _LIST):
+            data = as_utf8(read(name, most=MOST_LISTED), name)
+    elif sys.stdin is None:
         raise UsageError("-: stdin is closed; nothing can be read from it")
-    data = read_stream(sys.stdin.buffer, "-", MOST_LISTED)
-    if data.startswith(_NO_TEXT):
-        raise UsageError(
-            "-: stands for a list of files on stdin, one a line; what came is an image or an archive: "
-            "name its file in place of -"
-        )
-    return _lines(as_utf8(data, "-"))
+    else:
+        data = as_utf8(read_stream(sys.stdin.buffer, "-", MOST_LISTED), "-")
+        if data.startswith(_NO_TEXT):
+            raise UsageError(
+                "-: stands for a list of files on stdin, one a line; what came is an image or an archive: "
+                "name its file in place of -"
+            )
+    return _lines(data)
 
 
 def _lines(data: bytes) -> Iterator[str]:

@@ -30,17 +30,6 @@ _RECORD = b"rollcli"
 _ARROW_TYPES = {str: "string", float: "float64", int: "int64", bool: "bool"}
 
 
-def require_parquet() -> None:
-    """Refuse, before any work, what cannot be done without pyarrow.
-
-    Raises
-    ------
-    UsageError
-        The extra `parquet` is not installed.
-    """
-    require_extra("parquet", "Parquet")
-
-
 def encode_parquet(
     types: Mapping[str, type], rows: Sequence[Mapping[str, Any]], record: Mapping[str, Any]
 ) -> bytes:
@@ -85,7 +74,7 @@ def decode_parquet(data: bytes, name: str) -> Iterator[tuple[int, dict[str, Any]
     UsageError
         The extra `parquet` is not installed.
     """
-    require_parquet()
+    require_extra("parquet", "Parquet")
     import pyarrow
     import pyarrow.parquet
 

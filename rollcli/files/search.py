@@ -2,6 +2,7 @@
 
 import fnmatch
 import glob
+import itertools
 import os
 import posixpath
 import re
@@ -128,7 +129,7 @@ class Search:
 
     def __post_init__(self) -> None:
         self._skip = {os.path.realpath(folder) for folder in self.skip if not is_url(folder)}
-        self._skipped_urls = [folder.rstrip("/") for folder in self.skip if is_url(folder)]
+        self._skipped_urls = tuple(f"{folder.rstrip('/')}/" for folder in self.skip if is_url(folder))
 
     def files(self, argument: str, *, literal: bool = False) -> Iterator[tuple[str, str]]:
         """Yield each file of `argument`, and its path below the folder or pattern.
@@ -163,17 +164,20 @@ class Search:
         self, argument: str, files: Iterator[tuple[str, str]], kind: str
     ) -> Iterator[tuple[str, str]]:
         """Yield the files that --include and --exclude allow; finding none is an error."""
-        none, views = True, _Views(argument) if self.maps and kind != "pattern" else None
-        for path, relative in files:
-            names = (relative, posixpath.basename(relative))
-            if (not self.include or _match(names, self.include)) and not _match(names, self.exclude):
-                none = False
-                if views is not None:
-                    views.refuse(relative)
-                yield path, relative
-        if none:
+        wanted: Iterator[tuple[str, str]] = filter(self._allows, files)
+        if self.maps and kind != "pattern":
+            wanted = _without_views(argument.rstrip("/"), wanted)
+        first = next(wanted, None)
+        if first is None:
             hint = self._in_place_of_inputs(argument) if kind == "folder" else ""
             raise UsageError(f"{argument}: no input found in this {kind} ({' '.join(self.endings)}){hint}")
+        yield first
+        yield from wanted
+
+    def _allows(self, file: tuple[str, str]) -> bool:
+        names = (file[1], posixpath.basename(file[1]))
+        included = not self.include or _match(names, self.include)
+        return included and not _match(names, self.exclude)
 
     def _in_place_of_inputs(self, folder: str) -> str:
         """Say what a folder without inputs holds instead."""
@@ -255,50 +259,39 @@ class Search:
         if not pattern and (literal or not is_folder_url(url)):
             return iter([(url, base_name(url))])
         found = objects_behind(url, recursive=self.recursive)
-        readable = ((each, below) for each, below in found if self._reads(each) and not self._skips(each))
+        wanted = (each for each in found if not each[0].startswith(self._skipped_urls))
+        readable = ((each, below) for each, below in wanted if self._reads(each))
         return self._wanted(url, readable, "pattern" if pattern else "folder")
-
-    def _skips(self, url: str) -> bool:
-        return any(url.startswith(f"{folder}/") for folder in self._skipped_urls)
 
     def _reads(self, name: str) -> bool:
         return name.lower().endswith(self.endings)
 
 
-class _Views:
-    """Notices that what a folder holds are the two views of pairs, not maps."""
+def _without_views(folder: str, files: Iterator[tuple[str, str]]) -> Iterator[tuple[str, str]]:
+    """Yield the files of a folder, unless they are the two views of pairs, not maps.
 
-    def __init__(self, folder: str) -> None:
-        self._folder = folder.rstrip("/")
-        self._sides: dict[str, tuple[int, str]] = {}  # of places that are the same but for the side
-
-    def refuse(self, relative: str) -> None:
-        """Take in a file.
-
-        Raises
-        ------
-        UsageError
-            Its place, but for the side, is that of a file before it.
-        """
+    Raises
+    ------
+    UsageError
+        The place of one, but for the side, is that of a file before it.
+    """
+    sides: dict[str, tuple[int, str]] = {}  # of places that are the same but for the side
+    for path, relative in files:
         stem, ending = posixpath.splitext(relative)
-        if ending.lower() not in _PHOTOGRAPHS:
-            return
-        folders, name = stem.split("/")[:-1], stem.rpartition("/")[2]
+        *folders, name = stem.split("/")
         before, _, mark = name.rpartition(".")
-        self._compare("/".join([*folders, before, "*"]), mark, "/".join(folders))
-        for place, part in enumerate(folders):
-            self._compare("/".join([*folders[:place], "*"]), part, "/".join(folders[: place + 1]))
-
-    def _compare(self, key: str, mark: str, folder: str) -> None:
-        side = next((each for each in (0, 1) if mark.lower() in _SIDES[each]), None)
-        if side is None:
-            return
-        other, there = self._sides.setdefault(key, (side, folder))
-        if other != side:
-            left, right = (there, folder) if side == 1 else (folder, there)
-            join = "" if is_archive(self._folder) else "/"
-            left, right = (f"{self._folder}{join and f'/{each}'}".rstrip("/") for each in (left, right))
-            raise UsageError(f"{self._folder}: {_as_pairs(left, right)}")
+        for at, part in enumerate((*folders, mark) if ending.lower() in _PHOTOGRAPHS else ()):
+            side = next((each for each in (0, 1) if part.lower() in _SIDES[each]), None)
+            if side is not None:
+                above = folders[:at] if at < len(folders) else [*folders, before]
+                here = "/".join(folders[: at + 1])
+                other, there = sides.setdefault("/".join([*above, "*"]), (side, here))
+                if other != side:
+                    both = (there, here) if side == 1 else (here, there)
+                    inside = not is_archive(folder)
+                    left, right = (f"{folder}/{each}".rstrip("/") if inside else folder for each in both)
+                    raise UsageError(f"{folder}: {_as_pairs(left, right)}")
+        yield path, relative
 
 
 def _as_pairs(left: str, right: str) -> str:
@@ -335,6 +328,4 @@ def _identity(folder: str | Path) -> tuple[int, int]:
 
 def _fixed_part(pattern: str) -> Path:
     """Find the folder before the first wildcard."""
-    parts = Path(pattern).parts
-    fixed = next((i for i, part in enumerate(parts) if glob.has_magic(part)), len(parts))
-    return Path(*parts[:fixed])
+    return Path(*itertools.takewhile(lambda part: not glob.has_magic(part), Path(pattern).parts))

@@ -236,12 +236,10 @@ def create(location: str, data: bytes, owner: str = "", *, durable: bool = True)
 
 def _beginning_of(path: str, size: int) -> bytes | None:
     """Read a regular file of at most so many bytes; None for all else."""
-    try:
-        if Path(path).lstat().st_size > size:
-            return None
-        return _read_file(path, path)
-    except (OSError, InputError):
-        return None
+    with contextlib.suppress(OSError, InputError):
+        if Path(path).lstat().st_size <= size:
+            return _read_file(path, path)
+    return None
 
 
 def list_names(folder: str) -> list[str]:

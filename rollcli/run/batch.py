@@ -212,9 +212,8 @@ def join_results(frames: Span[Frame], results: Sequence[FrameResult], options: B
         read_as = read_as.joined(ReadAs(frozenset(filter(None, [encoding])), searched))
     lines = [format_row(result.row, options.form, options.further) for result in results]
     known: ReadAs = frames.told
-    made = zip(frames, results, strict=False)
-    keeps = options.frame.notes
-    notes = [result.inputs or inputs_line(frame, {}) for frame, result in made] if keeps else []
+    made = zip(frames, results, strict=False) if options.frame.notes else ()
+    notes = [result.inputs or inputs_line(frame, {}) for frame, result in made]
     in_parts = 0
     if options.parts is not None and not ends and known.joined(read_as) == known:
         in_parts = _write_parts(frames, figures.status, lines, notes, options)

@@ -1,16 +1,14 @@
 """`derotate`, `vdisparity`, `heights` and `disparity`: each frame becomes files of its own."""
 
 import contextlib
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
 from rollcli.errors import ExitStatus, UsageError
 from rollcli.extras import require_extra
 from rollcli.files.atomic import remove_leftovers
-from rollcli.files.containers import file_of
 from rollcli.files.results import Row
-from rollcli.files.stores.locations import tasks_in_hand
 from rollcli.messages import say
 from rollcli.run.find import Named, check_depth, check_first_size, map_frames, pair_frames
 from rollcli.run.frame import Frame, FrameResult, failed_frame
@@ -31,10 +29,11 @@ from rollcli.run.outputs import (
     paths_of,
     write_outputs,
 )
+from rollcli.run.plan import decoder_for, workers_for
 from rollcli.run.progress import Progress
 from rollcli.run.result_rows import rows_of
-from rollcli.run.workers.chunks import Work, Workers
-from rollcli.run.workers.interrupt import Stop, stop_on_signals
+from rollcli.run.workers.chunks import Work
+from rollcli.run.workers.interrupt import stop_on_signals
 from rollcli.run.workers.tasks import require_scheduler, run_tasks
 
 
@@ -52,15 +51,24 @@ def run_conversion(options: ConvertOptions) -> ExitStatus:
         list_files((each.reads(), paths_of(each, options)) for each in frames)
         return ExitStatus.DONE
     require_scheduler(running.scheduler)
-    remove_leftovers(path for each in frames for path in paths_of(each, options))
+    _remove_leftovers(frames, options)
     progress = Progress(len(frames), running, options.encoding, statuses=("ok",))
-    with (
-        stop_on_signals() as stop,
-        progress,
-        contextlib.closing(_results(frames, options, stop)) as results,
-    ):
-        for result in results:
-            progress.add(result)
+    told = replace(options, inputs=InputOptions())  # which may be long
+    work = Work(
+        partial(_convert, options=told, read=options.frame),  # made here, where relative paths start
+        partial(_lost, options=told),
+        lambda frame: _remove_leftovers([frame], told),
+        prepare=decoder_for(frames, options.frame),
+    )
+    workers = workers_for(frames, running, [options.output])
+    with stop_on_signals() as stop, progress:
+        try:
+            with contextlib.closing(run_tasks(frames, work, stop, workers)) as results:
+                for result in results:
+                    progress.add(result)
+        finally:
+            if running.scheduler is not None:  # a worker that died elsewhere cannot be waited for
+                _remove_leftovers(frames, options)
     progress.tell_end()
     if stop.asked and progress.done < progress.total:
         progress.say("interrupted; what is written is whole, and --overwrite starts anew")
@@ -132,39 +140,14 @@ def _find_rows(frames: Sequence[Frame], options: ConvertOptions) -> Sequence[Row
     return rows
 
 
-def _results(
-    frames: Sequence[Frame], options: ConvertOptions, stop: Stop
-) -> Generator[FrameResult, None, None]:
-    """Yield the result of each frame from whichever workers were asked for."""
-    running, folder = options.running, options.output
-    sample = (*frames[:1], *frames[-1:])
-    files = tuple(file_of(path) for each in sample for path in each.reads())
-    threads = tasks_in_hand((*files, folder))
-    workers = Workers(running.jobs, running.scheduler, files, (folder,), threads=threads)
-    told = replace(options, inputs=InputOptions())  # which may be long
-    work = Work(
-        partial(_convert, options=told, read=options.frame),  # made here, where relative paths start
-        partial(_lost, options=told),
-        lambda each: remove_leftovers(paths_of(each, told)),
-        prepare=partial(_decode, read=options.frame) if any(each.of_videos for each in frames) else None,
-    )
-    try:
-        yield from run_tasks(frames, work, stop, workers)
-    finally:
-        if workers.scheduler is not None:  # a worker that died elsewhere cannot be waited for
-            remove_leftovers(path for each in frames for path in paths_of(each, options))
+def _remove_leftovers(frames: Sequence[Frame], options: ConvertOptions) -> None:
+    remove_leftovers(path for frame in frames for path in paths_of(frame, options))
 
 
 def _convert(frame: Frame, options: ConvertOptions, read: FrameOptions) -> FrameResult:
     from rollcli.run.images import convert_frame  # loads NumPy: only on a worker
 
     return convert_frame(frame, options, read)
-
-
-def _decode(frame: Frame, read: FrameOptions) -> Frame:
-    from rollcli.run.read import decoded
-
-    return decoded(frame, read)
 
 
 def _lost(frame: Frame, reason: str, options: ConvertOptions) -> FrameResult:

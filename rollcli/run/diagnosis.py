@@ -169,7 +169,8 @@ def _likenesses(
         yield f"looks like a photograph, not a disparity map: {remedies.photograph}"
     if _grows_downward(disparity):
         return
-    depth = options.encoding.encoding != Encoding.DEPTH and _has_road(_inverse(disparity), options)
+    inverse = np.divide(1, disparity, out=np.zeros_like(disparity), where=disparity > 0)
+    depth = options.encoding.encoding != Encoding.DEPTH and _has_road(inverse, options)
     reversed_rows = _has_road(disparity[::-1], options)
     if depth and reversed_rows:  # few roads tell which
         yield f"looks like a depth map: {remedies.depth}; or it is {_UPSIDE_DOWN}"
@@ -203,11 +204,6 @@ def _grows_downward(disparity: NDArray[Any]) -> bool:
     if len(medians) < 3 or not np.ptp(medians[:, 1]) > 0:
         return False
     return bool(np.corrcoef(medians.T)[0, 1] > TUNING.downward)
-
-
-def _inverse(values: NDArray[Any]) -> NDArray[Any]:
-    inverse: NDArray[Any] = np.divide(1, values, out=np.zeros_like(values), where=values > 0)
-    return inverse
 
 
 def _has_road(disparity: NDArray[Any], options: FrameOptions) -> bool:

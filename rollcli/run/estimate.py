@@ -4,21 +4,19 @@ import contextlib
 import os
 from collections.abc import Iterator
 from functools import partial
-from itertools import islice
-from typing import NamedTuple
+from itertools import chain, islice
 
 from rollcli.errors import ExitStatus, OutputError, WorkerError
-from rollcli.files.containers import file_of
-from rollcli.files.stores.locations import is_url, tasks_in_hand
+from rollcli.files.stores.locations import is_url
 from rollcli.run.batch import Batch, BatchOptions, Step, join_results, line_form
 from rollcli.run.find import calibration_files, calibration_notes
 from rollcli.run.frame import Frame, FrameResult, ReadAs, failed_frame
 from rollcli.run.options import EstimateOptions, FrameOptions
-from rollcli.run.outputs import every_path, image_paths, list_files, remove_image_leftovers, write_outputs
-from rollcli.run.plan import Plan, make_plan
+from rollcli.run.outputs import every_path, list_files, possible_paths, remove_image_leftovers, write_outputs
+from rollcli.run.plan import Plan, decoder_for, make_plan, workers_for
 from rollcli.run.progress import Progress
 from rollcli.run.result import Output, frames_to_do, open_output
-from rollcli.run.workers.chunks import Work, Workers
+from rollcli.run.workers.chunks import Work
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
 from rollcli.run.workers.tasks import require_scheduler, run_joined
 
@@ -28,13 +26,6 @@ def estimate_frame(frame: Frame, options: FrameOptions) -> FrameResult:
     from rollcli.run.estimate_frame import run_frame
 
     return run_frame(frame, options)
-
-
-def decode_frame(frame: Frame, options: FrameOptions) -> Frame:
-    """Read the views of a frame of videos, for a worker of this machine."""
-    from rollcli.run.read import decoded
-
-    return decoded(frame, options)
 
 
 def lost_frame(frame: Frame, reason: str, options: FrameOptions) -> FrameResult:
@@ -68,14 +59,15 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
     UsageError, OutputError, WorkerError
         The run cannot start or cannot go on.
     """
-    if options.running.dry_run:
-        plan = make_plan(options)
-        list_files([(calibration_files(options.calibration), ())])
-        frames, images = frames_to_do(plan), options.images
-        list_files((frame.reads(), (path for _, path in image_paths(frame, images))) for frame in frames)
-        list_files([((), plan.files)])
-        return ExitStatus.DONE
-    return _run(make_plan(options), resume_command)
+    plan = make_plan(options)
+    if not options.running.dry_run:
+        return _run(plan, resume_command)
+    frames, images = frames_to_do(plan), options.images
+    of_frames = (
+        (frame.reads(), (paths[0] for _, paths in possible_paths(frame, images))) for frame in frames
+    )
+    list_files(chain([(calibration_files(options.calibration), ())], of_frames, [((), plan.files)]))
+    return ExitStatus.DONE
 
 
 def _run(plan: Plan, resume_command: str) -> ExitStatus:
@@ -89,7 +81,7 @@ def _run(plan: Plan, resume_command: str) -> ExitStatus:
             progress.note(note)
         try:
             with stop_on_signals() as stop, progress:
-                _run_steps(_Run(plan, output, progress, stop))
+                _run_steps(plan, output, progress, stop)
         except KeyboardInterrupt:  # the second Ctrl-C: without waiting for the frames that have begun
             progress.stopped_early = True
         except (OutputError, WorkerError) as error:
@@ -109,40 +101,30 @@ def _run(plan: Plan, resume_command: str) -> ExitStatus:
         return progress.summary.status
 
 
-class _Run(NamedTuple):
-    """What every part of a run works with."""
-
-    plan: Plan
-    output: Output
-    progress: Progress
-    stop: Stop
-
-
-def _steps(run: _Run) -> Iterator[Step]:
+def _steps(plan: Plan, output: Output, progress: Progress) -> Iterator[Step]:
     """Yield what is to do: images that kept rows should have, rows that are done again, then all others.
 
     A result takes rows in the place of others once the workers have ended, which hold the lock of the file
     that it was.
     """
-    kept, result, every = run.output.kept, run.plan.output, run.plan.frames
+    kept, result, every = output.kept, plan.output, plan.frames
     if kept.incomplete:
         missing = len(kept.incomplete)
-        run.progress.note(f"images are missing or empty for {missing} of the kept rows: they are made again")
+        progress.note(f"images are missing or empty for {missing} of the kept rows: they are made again")
         yield Step(kept.incomplete)
     name = result if is_url(result) else os.path.realpath(result)  # whichever folder it is resumed from
     for first in range(0, len(kept.again), _RETRIED_AT_ONCE):
         again = kept.again[first : first + _RETRIED_AT_ONCE]
         yield Step([every[position] for position in again], again, retry_of=name)
-    yield from run.output.passes()
+    yield from output.passes()
 
 
-def _run_steps(run: _Run) -> None:
+def _run_steps(plan: Plan, output: Output, progress: Progress, stop: Stop) -> None:
     """Do one step after the other; images are written before rows, and rows in their order."""
-    output, progress = run.output, run.progress
-    for step in _steps(run):
+    for step in _steps(plan, output, progress):
         done = 0
         progress.stopped_early = True  # unless all frames are done
-        with _results(step, run) as batches:
+        with _results(step, plan, output, stop) as batches:
             following = iter(step.frames)
             for batch in batches:
                 frames = list(islice(following, len(batch)))
@@ -157,7 +139,7 @@ def _run_steps(run: _Run) -> None:
                     output.append(frames, batch)
                 left = positions if positions[0] < output.kept.count else None  # places left to these rows
                 progress.add_rows([frame.file for frame in frames], batch.figures, batch.told, left)
-                if run.plan.options.result.fail_fast and batch.figures.first_error >= 0:
+                if plan.options.result.fail_fast and batch.figures.first_error >= 0:
                     return
         progress.stopped_early = done < len(step.frames)
         if progress.stopped_early:
@@ -165,14 +147,14 @@ def _run_steps(run: _Run) -> None:
 
 
 @contextlib.contextmanager
-def _results(step: Step, run: _Run) -> Iterator[Iterator[Batch]]:
+def _results(step: Step, plan: Plan, output: Output, stop: Stop) -> Iterator[Iterator[Batch]]:
     """Open the results of a step from whichever workers were asked for; the output is complete afterwards."""
-    options, output, frames, parts = run.plan.options, run.output, step.frames, step.parts
-    record = output.record
-    told = options.frame._replace(replaces=output.replaces, retry_of=step.retry_of, notes=record is not None)
+    options, record, frames, parts = plan.options, output.record, step.frames, step.parts
+    replaces = record.replaces if record else options.running.overwrite
+    told = options.frame._replace(replaces=replaces, retry_of=step.retry_of, notes=record is not None)
     rows = BatchOptions(
         line_form(options.result.form),
-        run.plan.further,
+        plan.further,
         told,
         verbose=options.running.verbose,
         fail_fast=options.result.fail_fast,
@@ -185,20 +167,12 @@ def _results(step: Step, run: _Run) -> Iterator[Iterator[Batch]]:
         partial(join_results, options=rows),
         lambda: record.read_as if record else ReadAs(),
         parts.rows if parts else 1,
-        partial(decode_frame, options=told) if any(frame.of_videos for frame in frames) else None,
+        decoder_for(frames, told),
     )
-    sample = (*frames[:1], *frames[-1:])
-    files = tuple(file_of(path) for frame in sample for path in frame.reads())
-    folders = tuple(folder for _, folder in options.images.folders())
-    workers = Workers(
-        options.running.jobs,
-        options.running.scheduler,
-        files,
-        (*folders, parts.output) if parts else folders,
-        tasks_in_hand((*files, *folders)),
-    )
+    folders = [folder for _, folder in options.images.folders()]
+    workers = workers_for(frames, options.running, folders, [parts.output] if parts else [])
     try:
-        with contextlib.closing(run_joined(frames, work, run.stop, workers)) as results:
+        with contextlib.closing(run_joined(frames, work, stop, workers)) as results:
             yield results
     finally:
         output.commit()

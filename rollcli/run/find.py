@@ -3,7 +3,7 @@
 import contextlib
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from functools import cache
 from pathlib import Path, PurePath, PurePosixPath
 from typing import TYPE_CHECKING, NamedTuple, overload
 
@@ -93,26 +93,25 @@ class Calibrations:
     """
 
     def __init__(self, given: CalibrationOptions) -> None:
-        self.given = given.given
-        self._given = given
+        self.given, self._calib = given.given, given.calib
         self._by_stem: dict[str, list[str]] | None = None
-        self._fetched: dict[str, bytes] = {}  # of an object store, where one after the other takes long
         self._one: Calibration | None = None
-        self._of_path: dict[str, Calibration] = {}  # one may be for a thousand frames
+        fetched: dict[str, bytes] = {}
         if len(given.calib) == 1 and is_place(given.calib[0]):
             files = _files(given.calib[0])
             self._by_stem = {}
             for path in files:
                 self._by_stem.setdefault(PurePosixPath(path).stem.removesuffix(_MARK), []).append(path)
-            self._fetched = fetch_all(filter(is_url, files), MAX_BYTES)
+            fetched = fetch_all(filter(is_url, files), MAX_BYTES)  # one after the other takes long
         elif given.given:
             self._one = _read(given.calib, given)
+        self._read = cache(lambda path: _read([path], given, fetched))  # one may be for a thousand frames
 
     def of(self, name: str) -> Calibration | None:
         """Return the calibration of a frame: of its stem, or of the stem up to one of its underscores."""
         if self._by_stem is None:
             return self._one
-        folder, stem = self._given.calib[0], PurePosixPath(frame_name(name)).stem
+        folder, stem = self._calib[0], PurePosixPath(frame_name(name)).stem
         shorter = stem  # KITTI's 000010.txt is for 000010_10.png
         while shorter not in self._by_stem:
             shorter = shorter.rpartition("_")[0]
@@ -121,9 +120,7 @@ class Calibrations:
         paths = self._by_stem[shorter]
         if len(paths) > 1:
             raise UsageError(f"{name}: has more than one calibration of its name: {paths[0]}, {paths[1]}")
-        if paths[0] not in self._of_path:
-            self._of_path[paths[0]] = _read([paths[0]], self._given, self._fetched)
-        return self._of_path[paths[0]]
+        return self._read(paths[0])
 
 
 def calibration_files(given: CalibrationOptions) -> list[str]:
@@ -182,14 +179,12 @@ def check_depth(frames: Sequence[Frame], encoding: EncodingOptions) -> None:
     ------
     UsageError
     """
-    if encoding.encoding != "depth":
-        return
-    for frame in frames:
-        if frame.calibration is None or frame.calibration.baseline is None:
-            raise UsageError(
-                "--encoding depth needs a focal length and a baseline, which turn a depth into a disparity: "
-                "give --calib, or --focal, --principal-point and --baseline"
-            )
+    used = (frame.calibration for frame in frames if encoding.encoding == "depth")
+    if any(calibration is None or calibration.baseline is None for calibration in used):
+        raise UsageError(
+            "--encoding depth needs a focal length and a baseline, which turn a depth into a disparity: "
+            "give --calib, or --focal, --principal-point and --baseline"
+        )
 
 
 def _files(folder: str) -> list[str]:
@@ -331,34 +326,26 @@ def pair_frames(named: Named) -> list[Frame]:
     with _search(named, (*IMAGE_ENDINGS, *videos)) as search:
         if pairs.side_by_side is not None:
             found = find_inputs(given.inputs, search, files_from=given.files_from)
-            both = [views for each in found for views in _halved(each, pairs.side_by_side)]
+            matched = [(each, each) for each in found]
         elif pairs.left is None or pairs.right is None:
             raise UsageError("--left and --right are given together")
         else:
             matched = pair_inputs(pairs.left, pairs.right, search, match=pairs.match)
-            both = [views for pair in matched for views in _paired(*pair)]
+        both = [views for pair in matched for views in _frames_of(*pair, pairs.side_by_side)]
     return [make.frame(left, right) for left, right in both[:: given.every]]
 
 
-def _halved(each: Input, layout: Layout) -> list[tuple[Input, Input]]:
-    """List the frames of a video as pairs, and an image as one."""
-    if not is_video(each.location):
-        return [(each, each)]
-    _require_local(each.location)
-    from rollcli.files.recordings.video import frames_of_video
-
-    return [(view, view) for view in frames_of_video(each, layout)]
-
-
-def _paired(left: Input, right: Input) -> list[tuple[Input, Input]]:
-    """Pair the frames of two videos; images are a pair themselves."""
+def _frames_of(left: Input, right: Input, layout: Layout | None) -> list[tuple[Input, Input]]:
+    """List the frames of two videos, or of one that holds both views; images are a pair themselves."""
     if not (is_video(left.location) or is_video(right.location)):
         return [(left, right)]
     for each in (left, right):
         _require_local(each.location)
-    from rollcli.files.recordings.video import frames_of_pair
+    from rollcli.files.recordings.video import frames_of_pair, frames_of_video
 
-    return frames_of_pair(left, right)
+    if layout is None:
+        return frames_of_pair(left, right)
+    return [(view, view) for view in frames_of_video(left, layout)]
 
 
 def _require_local(location: str) -> None:
@@ -405,14 +392,11 @@ def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
 
 
 def _bag_frames(bags: "Iterable[BagFrames]", make: "_FrameMaker") -> list[Frame]:
-    frames = []
+    frames: list[Frame] = []
     for bag in bags:
         if not make.quiet:
             say(*dict.fromkeys(bag.notes))
-        for left, right in bag.frames:
-            frame = make.frame(left, right)
-            own = make.calibrations.given
-            frames.append(frame if own else replace(frame, calibration=bag.calibration))
+        frames += [make.frame(left, right, bag.calibration) for left, right in bag.frames]
     return frames
 
 
@@ -429,8 +413,8 @@ class _FrameMaker:
         elif self._mask is not None and not (is_url(self._mask) or is_file(self._mask)):
             raise UsageError(f"{self._mask}: no such mask file or folder")
 
-    def frame(self, left: Input, right: Input | None = None) -> Frame:
-        """Make the frame of a map, or of the views of a pair."""
+    def frame(self, left: Input, right: Input | None = None, calibration: Calibration | None = None) -> Frame:
+        """Make the frame of a map, or of the views of a pair; `calibration` is that of its bag."""
         mask, stem = self._mask, PurePath(frame_name(left.name)).stem
         if self._masks is not None and (mask := self._masks.get(stem)) is None:
             raise UsageError(f"{left.name}: has no mask of its name in {self._mask}")
@@ -443,5 +427,5 @@ class _FrameMaker:
             right_path=right.location if right else "",
             relative=left.relative if not foreign or names_a_file(left.relative) else "",
             mask=mask,
-            calibration=self.calibrations.of(left.name),
+            calibration=self.calibrations.of(left.name) or calibration,
         )

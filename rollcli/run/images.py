@@ -33,15 +33,18 @@ from rollcli.run.options import (
     HeightsOptions,
     VDisparityOptions,
 )
-from rollcli.run.outputs import image_paths, paths_of, roomy_path, write_outputs
+from rollcli.run.outputs import paths_of, possible_paths, roomy_path, write_outputs
 from rollcli.run.read import Source, guarded, read_source
 
 TOO_LARGE_FOR_PNG = f"written as TIFF: a disparity is above the {KITTI_TOP:.0f} px of a KITTI PNG"
 
 
+_Named = tuple[str, bytes]
+
+
 @dataclass(frozen=True)  # without slots, for the cached heights
 class Pictured:
-    """A frame whose images are made.
+    """A frame whose images are made: a method for each of `KINDS` names and encodes one.
 
     Attributes
     ----------
@@ -58,8 +61,45 @@ class Pictured:
     options: FrameOptions
     calibration: Calibration | None = None
 
+    def derotated(self, path: str) -> _Named:
+        """Turn the map upright."""
+        source, theta = self.source, self.estimate.theta
+        if source.stored is None:
+            return encode_computed(path, derotate(source.shown, theta), self.options.images.save_as)
+        return path, encode_turned(source.stored, theta, source.encoding, self.options.encoding)
+
+    def vdisparity(self, path: str) -> _Named:
+        """Draw the v-disparity image of the map turned upright."""
+        estimate = self.estimate
+        histogram = v_disparity(derotate(self.source.shown, estimate.theta))
+        offset = row_offset(estimate.theta, estimate.width, estimate.height)
+        horizon = None if self.calibration is None else horizon_row(estimate.tangent, self.calibration)
+        row = None if horizon is None else horizon - offset
+        return path, encode_png(draw_v_disparity(histogram, estimate.alpha, offset, row))
+
+    def disparity(self, path: str) -> _Named:
+        """Take the map that was matched."""
+        return encode_computed(path, self.source.shown, self.options.images.save_as, self.source.text)
+
+    def road_mask(self, path: str) -> _Named:
+        """Draw the road that was found."""
+        source, road = self.source, self.estimate.road_mask
+        assert road is not None  # the frame's task asks for it
+        if source.photo is not None:
+            return path, encode_png(draw_road_on_photo(source.photo, road))
+        return path, encode_png(draw_road(source.shown, road))
+
+    def heights(self, path: str) -> _Named:
+        """Measure the heights over the road."""
+        return path, encode_heights(self._over, self.options.images.save_as, unit_of(self.calibration))
+
+    def heights_preview(self, path: str) -> _Named:
+        """Draw the heights over the road."""
+        span, unit = self.options.images.heights_range, unit_of(self.calibration)
+        return path, encode_png(draw_heights(self._over, span, unit, self.source.photo))
+
     @cached_property
-    def heights(self) -> NDArray[np.float32]:
+    def _over(self) -> NDArray[np.float32]:
         """The heights over the road, of a pair steadied; an image and its preview share them."""
         road = FittedRoad.of_estimate(self.estimate)
         heights = heights_over(self.source.shown, road, self.calibration)
@@ -69,9 +109,9 @@ class Pictured:
 def encode_images(frame: Frame, pictured: Pictured) -> tuple[dict[str, bytes], str]:
     """Make the images that were requested, by their paths, and what the row should say of them."""
     images, note = {}, ""
-    for kind, path in image_paths(frame, pictured.options.images):
-        planned = pictured.options.at(path)
-        target, data = _ENCODERS[kind.name](planned, pictured)
+    for kind, paths in possible_paths(frame, pictured.options.images):
+        planned = pictured.options.at(paths[0])
+        target, data = getattr(pictured, kind.name)(planned)
         images[target] = data
         if target != planned:
             note = TOO_LARGE_FOR_PNG
@@ -111,56 +151,6 @@ def encode_heights(heights: NDArray[np.float32], save_as: str, unit: str) -> byt
         return encode_stored(heights, "npy")
     return encode_tiff(heights, description=f"height over the road, {unit}")
 
-
-_Named = tuple[str, bytes]
-
-
-def _derotated(path: str, of: Pictured) -> _Named:
-    source, theta = of.source, of.estimate.theta
-    if source.stored is None:
-        return encode_computed(path, derotate(source.shown, theta), of.options.images.save_as)
-    return path, encode_turned(source.stored, theta, source.encoding, of.options.encoding)
-
-
-def _v_disparity(path: str, of: Pictured) -> _Named:
-    estimate = of.estimate
-    histogram = v_disparity(derotate(of.source.shown, estimate.theta))
-    offset = row_offset(estimate.theta, estimate.width, estimate.height)
-    horizon = None if of.calibration is None else horizon_row(estimate.tangent, of.calibration)
-    row = None if horizon is None else horizon - offset
-    return path, encode_png(draw_v_disparity(histogram, estimate.alpha, offset, row))
-
-
-def _disparity(path: str, of: Pictured) -> _Named:
-    return encode_computed(path, of.source.shown, of.options.images.save_as, of.source.text)
-
-
-def _road_mask(path: str, of: Pictured) -> _Named:
-    source, road = of.source, of.estimate.road_mask
-    assert road is not None  # the frame's task asks for it
-    if source.photo is not None:
-        return path, encode_png(draw_road_on_photo(source.photo, road))
-    return path, encode_png(draw_road(source.shown, road))
-
-
-def _heights(path: str, of: Pictured) -> _Named:
-    return path, encode_heights(of.heights, of.options.images.save_as, unit_of(of.calibration))
-
-
-def _heights_preview(path: str, of: Pictured) -> _Named:
-    span, unit = of.options.images.heights_range, unit_of(of.calibration)
-    return path, encode_png(draw_heights(of.heights, span, unit, of.source.photo))
-
-
-# by the names of `KINDS`
-_ENCODERS = {
-    "derotated": _derotated,
-    "vdisparity": _v_disparity,
-    "disparity": _disparity,
-    "road_mask": _road_mask,
-    "heights": _heights,
-    "heights_preview": _heights_preview,
-}
 
 _Made = tuple[dict[str, bytes], dict[str, str]]  # files by their paths, and warnings by their codes
 

@@ -1,6 +1,7 @@
 """The options of `estimate` and of the conversions. Import-light: the command line loads it for its help."""
 
 import math
+import posixpath
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -39,17 +40,18 @@ class ImageKind(NamedTuple):
     holds: Literal["picture", "map", "as input", "numbers"]
     help: str
 
-    def ending(self, save_as: Save, *, computed: bool) -> str | None:
-        """Return the ending of its files, None for that of the input; `computed`: from a pair."""
-        if self.holds == "picture":
-            return ENDING_OF_FORMAT["png"]
-        if self.holds == "numbers":
-            return ENDING_OF_FORMAT["tiff" if save_as == "png" else save_as]
-        return None if self.holds == "as input" and not computed else ENDING_OF_FORMAT[save_as]
+    def endings(self, save_as: Save, *, computed: bool) -> tuple[str | None, ...]:
+        """Return the endings that its files may have, the usual one first; None for that of the input.
 
-    def can_overflow(self, save_as: Save, *, computed: bool) -> bool:
-        """Tell whether a TIFF takes its place where a KITTI PNG cannot hold the map."""
-        return computed and save_as == "png" and self.holds in ("map", "as input")
+        A TIFF takes the place of a KITTI PNG that cannot hold the map. `computed`: from a pair.
+        """
+        if self.holds == "picture":
+            return (ENDING_OF_FORMAT["png"],)
+        if self.holds == "numbers":
+            return (ENDING_OF_FORMAT["tiff" if save_as == "png" else save_as],)
+        if self.holds == "as input" and not computed:
+            return (None,)
+        return tuple(map(ENDING_OF_FORMAT.__getitem__, ("png", "tiff") if save_as == "png" else (save_as,)))
 
 
 KINDS = (
@@ -217,6 +219,10 @@ class FrameOptions(NamedTuple):
         return located(self.root, path)
 
 
+Form = Literal["csv", "jsonl", "parquet"]
+_FORM_OF_ENDING: dict[str, Form] = {".jsonl": "jsonl", ".ndjson": "jsonl", ".parquet": "parquet"}
+
+
 class ResultOptions(NamedTuple):
     """Where the rows go, and which frames they are of.
 
@@ -225,7 +231,7 @@ class ResultOptions(NamedTuple):
     """
 
     output: str = "-"
-    format: Literal["csv", "jsonl", "parquet"] | None = None
+    format: Form | None = None
     resume: bool = False
     update: bool = False
     retry_failed: bool = False
@@ -236,14 +242,10 @@ class ResultOptions(NamedTuple):
     part_rows: int = 1000
 
     @property
-    def form(self) -> Literal["csv", "jsonl", "parquet"]:
+    def form(self) -> Form:
         """The format of the rows: the one given, else by the ending of the output."""
-        if self.format is not None:
-            return self.format
-        lower = self.output.lower().rstrip("/")
-        if lower.endswith((".jsonl", ".ndjson")):
-            return "jsonl"
-        return "parquet" if lower.endswith(".parquet") else "csv"
+        ending = posixpath.splitext(self.output.lower().rstrip("/"))[1]
+        return self.format or _FORM_OF_ENDING.get(ending, "csv")
 
 
 class EstimateOptions(NamedTuple):

@@ -17,29 +17,23 @@ from rollcli.files.atomic import is_folder, mark_path, remove_leftovers
 from rollcli.files.containers import file_of, shown
 from rollcli.files.results import STATUSES
 from rollcli.files.storage import create, read_bytes, remove, remove_all, write_bytes
-from rollcli.files.stores.locations import is_object_url, is_url, located, public_name, split_url
+from rollcli.files.stores.locations import is_object_url, is_url, located, public_name
 from rollcli.files.stores.objects import list_objects
 from rollcli.files.stream import STDOUT, open_stream
 from rollcli.run.frame import Frame
 from rollcli.run.options import ENDING_OF_FORMAT, ConvertOptions, ImageKind, ImageOptions, RunningOptions
 
 
-def image_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[ImageKind, str]]:
-    """Yield (kind, path) of each image that is written for a frame."""
+def possible_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[ImageKind, list[str]]]:
+    """Yield the kind of each image of a frame, and the paths of which one is written, the usual one first."""
     for kind, folder in images.folders() if frame.relative else ():
-        yield kind, output_path(frame, folder, kind.ending(images.save_as, computed=bool(frame.right_file)))
+        endings = kind.endings(images.save_as, computed=bool(frame.right_file))
+        yield kind, [output_path(frame, folder, ending) for ending in endings]
 
 
 def roomy_path(path: str) -> str:
     """Name the TIFF that is written in place of a KITTI PNG which cannot hold the map."""
     return posixpath.splitext(path)[0] + ENDING_OF_FORMAT["tiff"]
-
-
-def possible_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[str, ...]]:
-    """Yield, for each image of a frame, the paths of which one is written."""
-    for kind, path in image_paths(frame, images):
-        overflows = kind.can_overflow(images.save_as, computed=bool(frame.right_file))
-        yield (path, roomy_path(path)) if overflows else (path,)
 
 
 def local_images(
@@ -66,7 +60,12 @@ def paths_of(frame: Frame, options: ConvertOptions) -> list[str]:
 
 def every_path(frame: Frame, images: ImageOptions, root: str = "") -> list[str]:
     """List every image that may be written for a frame, from a folder where relative paths start."""
-    return [located(root, path) for paths in possible_paths(frame, images) for path in paths]
+    return [located(root, path) for _, paths in possible_paths(frame, images) for path in paths]
+
+
+def images_of(frames: Iterable[Frame], images: ImageOptions) -> Iterator[str]:
+    """Yield every image that may be written for frames; a list of them would take most of our memory."""
+    return (path for frame in frames if images.folders() for path in every_path(frame, images))
 
 
 def write_outputs(
@@ -99,10 +98,9 @@ def write_outputs(
     for path, data in files.items():
         write(path, data)
     if replaces:
-        for path in paths:
-            if path not in files:
-                with contextlib.suppress(OutputError):  # the row says what is wrong with the frame
-                    remove(path)
+        for path in set(paths) - files.keys():
+            with contextlib.suppress(OutputError):  # the row says what is wrong with the frame
+                remove(path)
 
 
 def _write_new(path: str, data: bytes) -> None:
@@ -133,7 +131,7 @@ def _mark(data: bytes, result: str) -> bytes:
 
 def remove_marks(frames: Collection[Frame], images: ImageOptions) -> None:
     """Remove the marks beside the images of frames that were done again, and what killed workers left."""
-    paths = [path for frame in frames for path in every_path(frame, images)]
+    paths = list(images_of(frames, images))
     marks = [mark_path(path) for path in paths]
     remove_leftovers([*paths, *marks])
     remove_all(filter(is_url, marks))
@@ -141,7 +139,7 @@ def remove_marks(frames: Collection[Frame], images: ImageOptions) -> None:
 
 def remove_image_leftovers(frames: Iterable[Frame], images: ImageOptions) -> None:
     """Remove the temporary files that killed workers left beside the images of these frames."""
-    remove_leftovers(path for frame in frames for path in every_path(frame, images))
+    remove_leftovers(images_of(frames, images))
 
 
 _LISTED_AT_ONCE = 10_000
@@ -273,10 +271,9 @@ class Existing:
     def __contains__(self, path: str) -> bool:
         if not is_object_url(path):
             return not _is_empty(path) if self._filled else os.path.lexists(path)
-        root = split_url(path)[0]
         folder = next((each for each in self._listed if path.startswith(each)), None)
         if folder is None:
-            folder = path[: path.rindex("/") + 1] if path.count("/") > root.count("/") + 1 else f"{root}/"
+            folder = path[: path.rindex("/") + 1]
             self._listed[folder] = {url for url, size, _ in list_objects(folder) if size or not self._filled}
         return path in self._listed[folder]
 

@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 
 from rollcli.errors import InputError, UsageError
+from rollcli.extras import require_extra
 from rollcli.files.atomic import is_folder, is_there, remove_leftovers, sync_files
 from rollcli.files.locking import locked_folder, not_resumable
 from rollcli.files.results import (
@@ -18,60 +19,52 @@ from rollcli.files.results import (
     format_header,
     format_row,
     parse_rows,
+    part_name,
     part_names,
     read_parts,
-    require_parquet,
     run_path,
 )
 from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url, located, public_name
 from rollcli.run.batch import Batch, Parts, Step, line_form, part_location
 from rollcli.run.frame import Frame
-from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
+from rollcli.run.outputs import remove_image_leftovers
 from rollcli.run.plan import Plan
 from rollcli.run.progress import RunSummary
 from rollcli.run.result_file import Inputs, inputs_path, is_part_inputs, part_inputs_path, split_lines
-from rollcli.run.resume import KeptRows, RunRecord, check_restored, new_record
+from rollcli.run.resume import KeptRows, RecordedOutput, RunRecord, new_record
 
 _CHECK_S = 10.0  # a request of 50 ms now and then
 
 
-class PartsOutput:
+class PartsOutput(RecordedOutput):
     """Rows to a folder of parts, FILE.inputs and FILE.run.json beside it.
 
     Workers write the parts of which they have all rows. This process writes the others.
     """
 
     def __init__(self, record: RunRecord, kept: KeptRows) -> None:
-        self.kept, self.replaces = kept, record.replaces
-        self.record, self._plan = record, record.plan
+        super().__init__(record, kept)
         self._part_rows = record.plan.options.result.part_rows
         output = located(record.plan.options.running.root, record.plan.output)
         self._parts = Parts(
             output, self._plan.format, self._plan.further, self._part_rows, (), 0, record.run, record.of_rows
         )
         self._numbers: Iterator[int] = iter(())  # of the parts to come
-        # rows and the lines of their inputs, by their positions in the result
-        self._replaced_part, self._replacing = 0, dict[int, tuple[bytes, bytes]]()
-        self._waiting: list[tuple[bytes, bytes]] = []
+        self._waiting: list[tuple[bytes, bytes]] = []  # rows, and the lines of their inputs
         self._images: list[str] = []  # those of the part that is being filled
         self._checked = time.monotonic()
-        self._written = kept.count - sum(map(len, kept.holes))
+        self._written = kept.count - len(kept.holes)
 
     def passes(self) -> Iterator[Step]:
         """Yield the frames of parts that are missing before others, then those after all of them."""
-        rows, every, done = self._part_rows, self._plan.frames, self.kept.count
-        holes = [position for hole in self.kept.holes for position in hole]
-        missing = [position // rows for position in holes[::rows]]
-        rest = range(done, len(every))
-        for frames, positions, numbers in (
-            ([every[position] for position in holes], holes, missing),
-            (every[done:], rest, range(_whole_parts(done, rows), _whole_parts(len(every), rows))),
-        ):
+        every, holes, done = self._plan.frames, self.kept.holes, self.kept.count
+        steps = (([every[at] for at in holes], holes), (every[done:], range(done, len(every))))
+        for frames, positions in steps:
             if positions:
+                numbers = tuple(position // self._part_rows for position in positions[:: self._part_rows])
                 self._numbers = iter(numbers)
-                parts = self._parts._replace(numbers=tuple(numbers), frames=len(positions))
-                yield Step(frames, positions, parts)
+                yield Step(frames, positions, self._parts._replace(numbers=numbers, frames=len(positions)))
 
     def append(self, frames: Sequence[Frame], batch: Batch) -> None:
         """Take the rows; every full part is written."""
@@ -82,9 +75,7 @@ class PartsOutput:
             next(self._numbers)
         self._written += batch.in_parts
         self._waiting += zip(batch.lines, batch.notes, strict=True)
-        self._images += local_images(
-            frames[batch.in_parts :], batch.figures.status[batch.in_parts :], self._plan.options.images
-        )
+        self._take_images(frames[batch.in_parts :], batch.figures.status[batch.in_parts :])
         while len(self._waiting) >= self._part_rows:
             self._write()
 
@@ -95,41 +86,23 @@ class PartsOutput:
         self.record.write(summary)
         _remove_leftovers(self._plan)  # of workers that have died
 
-    def restore(self, frames: Sequence[Frame], batch: Batch) -> None:
-        """Take the images of incomplete frames, which were made again.
-
-        Raises
-        ------
-        OutputError
-            They could not be made: a row no longer holds.
-        """
-        check_restored(batch)
-        self._images += local_images(frames, batch.figures.status, self._plan.options.images)
-
-    def replace(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
-        """Take rows; a part is written anew once its last such row is known."""
-        self.record.saw(batch.read_as)
-        for at, position in enumerate(positions):
-            if position // self._part_rows != self._replaced_part:
-                self.commit()
-            self._replaced_part = position // self._part_rows
-            self._replacing[position] = batch.lines[at], batch.notes[at]
-            status = batch.figures.status[at : at + 1]
-            self._images += local_images(frames[at : at + 1], status, self._plan.options.images)
+    def _keep_images(self, images: Iterable[str]) -> None:
+        self._images += images
 
     def commit(self) -> None:
-        """Write the part anew whose rows are replaced, if they differ; a new part waits until it is full."""
-        sync_files(self._images)
-        self._images.clear()
-        if not self._replacing:
-            return
-        number, first = self._replaced_part, self._replaced_part * self._part_rows
+        """Write those parts anew of which rows are replaced; a part that is new waits until it is full."""
+        self._sync_images()
+        for number in dict.fromkeys(position // self._part_rows for position in self._replacing):
+            self._write_anew(number)
+        self._end_replacing()
+
+    def _write_anew(self, number: int) -> None:
         form = line_form(self._plan.format)
         old = [format_row(row, form, self._plan.further) for row in _rows_of_part(self._plan, number)]
         path = part_inputs_path(self._plan.output, number)
         inputs = read_bytes(path)
-        both = zip(old, split_lines(inputs), strict=True)
-        lines, notes = zip(*(self._replacing.get(*each) for each in enumerate(both, first)), strict=True)
+        both = enumerate(zip(old, split_lines(inputs), strict=True), number * self._part_rows)
+        lines, notes = zip(*(self._replacing.get(*each) for each in both), strict=True)
         if b"".join(notes) != inputs:
             self._check_owned()
             # in this order: of a run that is killed in between, the rows still are errors, and are done again
@@ -137,8 +110,6 @@ class PartsOutput:
         if lines != tuple(old):
             self._check_owned()
             write_bytes(_location(self._plan, number), self._parts.encoded(number, lines), durable=True)
-        remove_marks([self._plan.frames[position] for position in self._replacing], self._plan.options.images)
-        self._replacing.clear()
 
     def hint(self) -> str:
         """Say that --resume continues after the last part."""
@@ -148,9 +119,12 @@ class PartsOutput:
         self.record.check_owned()
         self._checked = time.monotonic()
 
-    def _write(self) -> None:
+    def _sync_images(self) -> None:
         sync_files(self._images)
         self._images.clear()
+
+    def _write(self) -> None:
+        self._sync_images()
         lines, notes = zip(*self._waiting[: self._part_rows], strict=True)
         self._parts.write(next(self._numbers), lines, notes)
         self._checked = time.monotonic()
@@ -170,13 +144,10 @@ def open_parts(plan: Plan) -> Iterator[PartsOutput]:
         The folder cannot be written.
     """
     if plan.format == "parquet":
-        require_parquet()
+        require_extra("parquet", "Parquet")  # before any work
     check_parts(plan)
-    if is_url(plan.output):
+    with contextlib.nullcontext() if is_url(plan.output) else locked_folder(plan.output):
         yield _begin(plan)
-    else:
-        with locked_folder(plan.output):
-            yield _begin(plan)
 
 
 def _begin(plan: Plan) -> PartsOutput:
@@ -188,8 +159,8 @@ def _begin(plan: Plan) -> PartsOutput:
     _remove_leftovers(plan, parts)
     if options.result.resume or options.running.overwrite:
         remove_image_leftovers(kept.not_failed(), options.images)
-    firsts = enumerate(range(0, kept.count, options.result.part_rows))
-    whole = [number for number, first in firsts if not any(first in hole for hole in kept.holes)]
+    rows = options.result.part_rows
+    whole = set(range(_whole_parts(kept.count, rows))).difference(at // rows for at in kept.holes)
     stay = {path for number in whole for path in _part_paths(plan, number)}
     inputs = [f"{inputs_path(plan.output)}/{name}" for name in list_names(inputs_path(plan.output))]
     # in this order, no part is ever without its inputs
@@ -236,8 +207,7 @@ def check_parts(plan: Plan) -> list[str]:
 
 def kept_in_parts(plan: Plan) -> KeptRows:
     """Take in the rows that a resume would keep."""
-    parts = check_parts(plan)
-    return _kept(plan, parts)[0]
+    return _kept(plan, check_parts(plan))[0]
 
 
 def _kept(plan: Plan, parts: list[str]) -> tuple[KeptRows, dict[str, bytes]]:
@@ -249,7 +219,11 @@ def _kept(plan: Plan, parts: list[str]) -> tuple[KeptRows, dict[str, bytes]]:
     kept, renewed = KeptRows(plan), dict[str, bytes]()
     if not plan.options.result.resume:
         return kept, renewed
-    rows, numbered = plan.options.result.part_rows, dict(_numbered(plan, parts))
+    rows, numbered = plan.options.result.part_rows, dict[str, int]()
+    for name in parts:
+        number = int(name.removeprefix("part-").partition(".")[0])
+        if name == part_name(number, plan.format):  # no run names a part otherwise
+            numbered[name] = number
     header = b"" if 0 in numbered.values() else format_header(plan.format, plan.further)
     try:
         for name, data in read_parts(plan.output, numbered, header):
@@ -267,14 +241,6 @@ def _kept(plan: Plan, parts: list[str]) -> tuple[KeptRows, dict[str, bytes]]:
     except InputError as error:
         raise not_resumable(plan.output, str(error)) from error
     return kept, renewed
-
-
-def _numbered(plan: Plan, names: Iterable[str]) -> Iterator[tuple[str, int]]:
-    """Yield names of parts and their numbers, those apart that no run gives to a part."""
-    for name in names:
-        number = int(name.removeprefix("part-").partition(".")[0])
-        if name == base_name(_location(plan, number)):
-            yield name, number
 
 
 def _rows_of_part(plan: Plan, number: int) -> tuple[Row, ...]:

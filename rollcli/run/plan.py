@@ -1,24 +1,28 @@
 """Decide and check what a run will read and write, before anything runs."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 
 from rollcli.errors import UsageError
+from rollcli.files.containers import file_of
 from rollcli.files.results import IMAGE_ROLL, TIMING, Format, run_path
-from rollcli.files.stores.locations import is_url
+from rollcli.files.stores.locations import is_url, tasks_in_hand
 from rollcli.files.stream import is_stream
 from rollcli.run.find import Named, calibration_files, check_depth, check_first_size, map_frames, pair_frames
 from rollcli.run.frame import Frame
-from rollcli.run.options import EstimateOptions, ResultOptions
+from rollcli.run.options import EstimateOptions, FrameOptions, ResultOptions, RunningOptions
 from rollcli.run.outputs import (
     check_inputs_are_kept,
     check_nothing_is_there,
     check_one_owner,
     check_places,
     every_path,
+    images_of,
 )
 from rollcli.run.result_file import inputs_path
+from rollcli.run.workers.chunks import Workers
 
 
 @dataclass(frozen=True)
@@ -73,18 +77,18 @@ def make_plan(options: EstimateOptions) -> Plan:
             "--update takes a result in one file of CSV or JSON Lines"
         )
     if options.images.folders():
-        check_one_owner(((frame, images_of([frame], options)) for frame in frames), plan.files)
+        check_one_owner(((frame, every_path(frame, options.images)) for frame in frames), plan.files)
     calibrations = calibration_files(options.calibration)
     check_inputs_are_kept(
         lambda: chain(calibrations, (path for frame in plan.frames for path in frame.reads())),
-        chain(plan.files, images_of(plan.frames, options)),
+        chain(plan.files, images_of(plan.frames, options.images)),
     )
     frames = _shard(frames, options.result)
     check_places(frames, [folder for _, folder in options.images.folders()])
     checked = options.calibration.given or options.pairs.side_by_side is not None
     notes = check_first_size(frames, options.frame) if checked else []
     if not (options.running.overwrite or options.result.resume):
-        check_nothing_is_there(images_of(frames, options))
+        check_nothing_is_there(images_of(frames, options.images))
     if plan.format == "parquet" and is_stream(plan.output):
         raise UsageError("Parquet is a folder of parts: name it with --output")
     further = further_columns(frames, options.result)
@@ -120,13 +124,6 @@ def _shard(frames: Sequence[Frame], options: ResultOptions) -> Sequence[Frame]:
     return frames[part - 1 :: parts]
 
 
-def images_of(frames: Iterable[Frame], options: EstimateOptions) -> Iterator[str]:
-    """Yield every image that may be written; a list of them would take most of our memory."""
-    if not options.images.folders():
-        return iter(())
-    return (path for frame in frames for path in every_path(frame, options.images))
-
-
 def _find_frames(options: EstimateOptions) -> Sequence[Frame]:
     given, quiet = options.inputs, options.running.quiet
     skip = [folder for _, folder in options.images.folders()]
@@ -138,3 +135,26 @@ def _find_frames(options: EstimateOptions) -> Sequence[Frame]:
     if options.images.disparity is not None:
         raise UsageError("--disparity writes maps computed from --left and --right; here maps are the input")
     return map_frames(named)
+
+
+def workers_for(
+    frames: Sequence[Frame], running: RunningOptions, folders: Iterable[str], parts: Iterable[str] = ()
+) -> Workers:
+    """Say which workers do the frames, what they write below `folders`, and what they must see.
+
+    `parts`: the folder of those parts of a result that they write.
+    """
+    files = tuple(file_of(path) for frame in (*frames[:1], *frames[-1:]) for path in frame.reads())
+    threads = tasks_in_hand((*files, *folders))
+    return Workers(running.jobs, running.scheduler, files, (*folders, *parts), threads)
+
+
+def decoder_for(frames: Iterable[Frame], options: FrameOptions) -> Callable[[Frame], Frame] | None:
+    """Return what reads the views of frames of videos for the workers of this machine; see `Work.prepare`."""
+    return partial(_decode, options=options) if any(frame.of_videos for frame in frames) else None
+
+
+def _decode(frame: Frame, options: FrameOptions) -> Frame:
+    from rollcli.run.read import decoded  # loads NumPy, which other runs leave to the workers
+
+    return decoded(frame, options)

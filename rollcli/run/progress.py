@@ -11,7 +11,6 @@ from array import array
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from statistics import median
-from types import TracebackType
 from typing import Any, NamedTuple
 
 from rollcli.errors import ExitStatus
@@ -204,9 +203,7 @@ class TaskProgress:
             self._bar = tqdm(total=self.total, initial=self.kept, **how)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         if self._bar is not None:
             self._bar.close()
 

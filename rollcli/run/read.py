@@ -3,9 +3,8 @@
 import contextlib
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
@@ -29,10 +28,6 @@ from rollcli.stereo.options import StereoOptions
 
 if TYPE_CHECKING:
     from rollcli.stereo.match import StereoMatch, Wanted
-
-
-Corner = tuple[float, float]
-_FAR = 2**17  # pixels; a side that leaves the map there is still straight to a hundredth of a pixel
 
 
 def region_mask(mask: str | None, options: FrameOptions, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
@@ -64,31 +59,9 @@ def _drawn(options: RegionOptions, shape: tuple[int, ...]) -> NDArray[np.bool_]:
     inside[y0:y1, x0:x1] = 1
     if options.polygon is not None:
         area: NDArray[Any] = np.zeros(shape, np.uint8)
-        if corners := _near(options.polygon):
-            cv2.fillPoly(area, [np.rint(corners).astype(np.int32)], 1)
+        cv2.fillPoly(area, [np.rint(options.polygon).astype(np.int32)], 1)
         inside &= area
     return inside.astype(np.bool_)
-
-
-def _near(corners: Sequence[Corner]) -> Sequence[Corner]:
-    """Cut off what lies far outside of any map [Sutherland, Hodgman 1974]: OpenCV would fill that, too.
-
-    In fractions, for of a step between 1e300 and a pixel a float keeps nothing.
-    """
-    exact = [(Fraction(u), Fraction(v)) for u, v in corners]
-    for axis in (0, 1):
-        for bound, side in ((-_FAR, 1), (_FAR, -1)):
-            kept: list[tuple[Fraction, Fraction]] = []
-            for one, other in zip(exact, (*exact[1:], *exact[:1]), strict=True):
-                first, second = side * (one[axis] - bound), side * (other[axis] - bound)
-                if first >= 0:
-                    kept.append(one)
-                if (first >= 0) != (second >= 0):
-                    share = first / (first - second)
-                    cut = [a + share * (b - a) for a, b in zip(one, other, strict=True)]
-                    kept.append((cut[0], cut[1]))
-            exact = kept
-    return [(float(u), float(v)) for u, v in exact]
 
 
 @lru_cache(maxsize=1)  # a mask for all frames is read once, unless it changes: workers outlive runs
@@ -183,8 +156,7 @@ def read_source(frame: Frame, options: FrameOptions) -> Source:
     if frame.right_file:
         return _match(frame, options)
     source = _read(frame, options)
-    allowed = region_mask(frame.mask, options, source.disparity.shape)
-    return source if allowed is None else replace(source, allowed=allowed)
+    return replace(source, allowed=region_mask(frame.mask, options, source.disparity.shape))
 
 
 def _read(frame: Frame, options: FrameOptions) -> Source:
@@ -265,23 +237,17 @@ def matched_source(
     match = match_pair(left, right, options, wanted)
     searched = (match.min_disparity, match.min_disparity + match.num_disparities - 1)
     height, width = left.shape[:2]
+    # rounded: a resumed run reads them from its rows
+    lies = () if match.lies is None else match.lies.values(*match.disparity.shape)
     return Source(
         match.disparity,
         searched=searched,
         slope_error=match.slope_error,
         doubts={"range": _doubt_of_range(match), "match": match.doubt},
-        alignment=_alignment(match),
+        alignment={name: round(each, 4) for name, each in zip(ALIGNMENT_COLUMNS, lies, strict=False)},
         size=(width, height),
         whole=match.whole,
     )
-
-
-def _alignment(match: "StereoMatch") -> dict[str, float]:
-    """Return the columns of how the right view lay, rounded: a resumed run reads them from its rows."""
-    if match.lies is None:
-        return {}
-    values = match.lies.values(*match.disparity.shape)
-    return {name: round(each, 4) for name, each in zip(ALIGNMENT_COLUMNS, values, strict=True)}
 
 
 def wanted_of(allowed: NDArray[np.bool_] | None, request: Request, *, whole: bool = False) -> "Wanted":

@@ -3,7 +3,7 @@
 import contextlib
 import io
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain, islice
 
 from rollcli.errors import InputError, UsageError
@@ -14,7 +14,7 @@ from rollcli.files.stores.locations import base_name
 from rollcli.files.stream import STDOUT, is_stream, open_stream
 from rollcli.run.batch import Batch, Step
 from rollcli.run.frame import Frame
-from rollcli.run.outputs import local_images, remove_image_leftovers, remove_marks
+from rollcli.run.outputs import local_images, remove_image_leftovers
 from rollcli.run.parts import PartsOutput, kept_in_parts, open_parts
 from rollcli.run.plan import Plan
 from rollcli.run.progress import RunSummary
@@ -32,9 +32,9 @@ from rollcli.run.result_file import (
 )
 from rollcli.run.resume import (
     KeptRows,
+    RecordedOutput,
     RunRecord,
     arranged,
-    check_restored,
     is_replaceable_record,
     new_record,
 )
@@ -47,7 +47,6 @@ class StreamOutput:
 
     def __init__(self, write: Callable[[bytes], None], plan: Plan) -> None:
         self.kept = KeptRows(plan)
-        self.replaces = plan.options.running.overwrite
         self._write, self._plan = write, plan
         self._write(format_header(plan.format, plan.further))
 
@@ -76,25 +75,12 @@ class StreamOutput:
         return ""
 
 
-class FileOutput:
-    """Rows to a locked file, FILE.inputs and FILE.run.json beside it; images are durable before their row.
-
-    Attributes
-    ----------
-    kept : KeptRows
-        What is known of the rows of an interrupted run, which is resumed.
-    record : RunRecord or None
-        FILE.run.json; a stream has none, and cannot be continued.
-    replaces : bool
-        Whether images are replaced that were there before the run: it was begun with --overwrite.
-    """
+class FileOutput(RecordedOutput):
+    """Rows to a locked file, FILE.inputs and FILE.run.json beside it; images are durable before their row."""
 
     def __init__(self, file: ResultFile, inputs: ResultFile, record: RunRecord, kept: KeptRows) -> None:
-        self.kept, self.replaces = kept, record.replaces
-        self._file, self.record, self._plan = file, record, record.plan
-        self._images = record.plan.options.images
-        self._inputs, self._rows = inputs, DurableRows(file, inputs)
-        self._replacing: dict[int, tuple[bytes, bytes]] = {}  # rows, and the lines of their inputs
+        super().__init__(record, kept)
+        self._file, self._inputs, self._rows = file, inputs, DurableRows(file, inputs)
 
     def passes(self) -> Iterator[Step]:
         """Yield the frames after the rows that are kept."""
@@ -104,27 +90,11 @@ class FileOutput:
     def append(self, frames: Sequence[Frame], batch: Batch) -> None:
         """Add the rows, after the record knows how their frames were read; they may wait for others."""
         self.record.saw(batch.read_as)
-        self._rows.append(batch.lines, batch.notes, local_images(frames, batch.figures.status, self._images))
+        images = local_images(frames, batch.figures.status, self._plan.options.images)
+        self._rows.append(batch.lines, batch.notes, images)
 
-    def restore(self, frames: Sequence[Frame], batch: Batch) -> None:
-        """Take the images of incomplete frames, which were made again.
-
-        Raises
-        ------
-        OutputError
-            They could not be made: a row no longer holds.
-        """
-        check_restored(batch)
-        self._rows.restore(local_images(frames, batch.figures.status, self._images))
-
-    def replace(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
-        """Take rows in the place of kept ones, and their images; positions increase.
-
-        The file gets them all at once, in `commit`.
-        """
-        self.record.saw(batch.read_as)
-        self._replacing.update(zip(positions, zip(batch.lines, batch.notes, strict=True), strict=True))
-        self._rows.restore(local_images(frames, batch.figures.status, self._images))
+    def _keep_images(self, images: Iterable[str]) -> None:
+        self._rows.append((), (), images)
 
     def commit(self) -> None:
         """Force the images and rows that were added to the disk."""
@@ -132,16 +102,12 @@ class FileOutput:
         if self._replacing:
             rows = {at: row for at, (row, _) in self._replacing.items()}
             lines = {at: line for at, (_, line) in self._replacing.items()}
+            writes = [(self._file, rows, self._plan.format), (self._inputs, lines, "jsonl")]
             # a run that is killed in between leaves rows that the same command makes again: where it updates,
             # those whose lines tell of other contents, and else those that still are errors
-            if self._plan.options.result.update:
-                self._file.replace(rows, self._plan.format)
-                self._inputs.replace(lines, "jsonl")
-            else:
-                self._inputs.replace(lines, "jsonl")
-                self._file.replace(rows, self._plan.format)
-            remove_marks([self._plan.frames[position] for position in self._replacing], self._images)
-            self._replacing.clear()
+            for file, new, form in writes if self._plan.options.result.update else reversed(writes):
+                file.replace(new, form)
+            self._end_replacing()
 
     def finish(self, summary: RunSummary) -> None:
         """Write it into the record."""
@@ -196,9 +162,8 @@ def frames_to_do(plan: Plan) -> Iterator[Frame]:
     else:
         _check_permitted(plan)
         kept = _parsed(data_of(plan.output) if plan.options.result.resume else b"", plan)[1]
-    again = (plan.frames[position] for position in kept.again)
-    holes = (frame for hole in kept.holes for frame in plan.frames[hole.start : hole.stop])
-    return chain(kept.incomplete, again, holes, plan.frames[kept.count :])
+    undone = (plan.frames[position] for position in (*kept.again, *kept.holes))
+    return chain(kept.incomplete, undone, plan.frames[kept.count :])
 
 
 def _parsed(data: bytes, plan: Plan) -> tuple[bytes, KeptRows]:

@@ -102,8 +102,9 @@ class ResultFile:
             The disk does not take the new file; the old one is as it was.
         """
         first = -1 if form == "csv" else 0  # the header
-        rest = enumerate(row_lines(self._old_lines(), form), first)
-        self.rewrite(rows.get(position, line) for position, line in rest)
+        with writing(self._name):
+            old = io.BytesIO(Path(self._name).read_bytes())
+        self.rewrite(rows.get(at, line) for at, line in enumerate(row_lines(old, form), first))
 
     def rewrite(self, lines: Iterable[bytes]) -> None:
         """Write the file anew, all in one step, and continue behind these lines; see `replace`."""
@@ -119,13 +120,6 @@ class ResultFile:
                 locked_file = os.dup(new.fileno())  # the lock is the open file's, and stays with it
                 held.callback(os.close, locked_file)
             os.dup2(locked_file, self._descriptor, inheritable=False)
-
-    def _old_lines(self) -> Iterator[bytes]:
-        if _ON_WINDOWS:  # it renames onto no open file
-            yield from io.BytesIO(self.read())
-            return
-        with Path(os.path.realpath(self._name)).open("rb") as old:
-            yield from old
 
     def _replace_closed(self, target: str, data: bytes) -> None:
         """Write the file anew while it is closed: Windows renames onto no open file.
@@ -277,11 +271,12 @@ class DurableRows:
         self._rows: list[bytes] = []
         self._images: list[str] = []
         self._folders: set[Path] = set()  # whose names are on the disk
-        self._unsynced = False
         self._last, self._wait_s = time.monotonic(), 0.0
 
     def append(self, rows: Sequence[bytes], inputs: Sequence[bytes], images: Iterable[str]) -> None:
         """Add rows, the lines of their inputs, and the images that must be on the disk before them.
+
+        There may be images alone, whose rows are in the result already.
 
         Raises
         ------
@@ -294,18 +289,8 @@ class DurableRows:
             self._rows.extend(rows)
         else:
             self._write(rows)
-        self._commit_in_time()
-
-    def restore(self, images: Iterable[str]) -> None:
-        """Add images whose row is in the result already.
-
-        Raises
-        ------
-        OutputError
-            The disk does not take an image or a row.
-        """
-        self._images.extend(images)
-        self._commit_in_time()
+        if time.monotonic() - self._last >= self._wait_s or len(self._images) >= _MOST_IMAGES:
+            self.commit()
 
     def commit(self) -> None:
         """Force everything to the disk that was added.
@@ -321,23 +306,15 @@ class DurableRows:
             self._images.clear()
         rows, self._rows = self._rows, []  # first: a commit after an interrupt must not write one again
         self._write(rows)
-        if self._unsynced:
-            self._inputs.sync()
-            self._file.sync()
-            self._unsynced = False
+        self._inputs.sync()
+        self._file.sync()
         self._last = time.monotonic()
         self._wait_s = min(_SHARE * (self._last - start), _LONGEST_S)
 
-    def _commit_in_time(self) -> None:
-        if time.monotonic() - self._last >= self._wait_s or len(self._images) >= _MOST_IMAGES:
-            self.commit()
-
     def _write(self, rows: Sequence[bytes]) -> None:
-        if not rows:
-            return
-        self._unsynced = True
-        self._file.append(b"".join(rows))
-        self.written += len(rows)
+        if rows:
+            self._file.append(b"".join(rows))
+            self.written += len(rows)
 
 
 _PART_ENDING = "inputs"

@@ -95,8 +95,5 @@ def _tell_suspects(rows: Sequence[Row], result: str, *, skip_suspect: bool, quie
         raise UsageError(f"{result}: every angle is suspect: --skip-suspect leaves out all maps")
     if not suspects or quiet:
         return
-    of = f"{result}: {suspects} of {len(rows)} angles {'is' if suspects == 1 else 'are'} suspect"
-    if skip_suspect:
-        say(f"{of}; such maps are left out")
-    else:
-        say(f"{of} and used; --skip-suspect leaves such maps out")
+    done = "; such maps are left out" if skip_suspect else " and used; --skip-suspect leaves such maps out"
+    say(f"{result}: {suspects} of {len(rows)} angles {'is' if suspects == 1 else 'are'} suspect{done}")

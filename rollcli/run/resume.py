@@ -9,6 +9,7 @@ import io
 import json
 import os
 import uuid
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from itertools import islice
@@ -30,8 +31,15 @@ from rollcli.run.options import (
     MethodOptions,
     RegionOptions,
 )
-from rollcli.run.outputs import Existing, check_nothing_is_there, possible_paths
-from rollcli.run.plan import Plan, images_of
+from rollcli.run.outputs import (
+    Existing,
+    check_nothing_is_there,
+    images_of,
+    local_images,
+    possible_paths,
+    remove_marks,
+)
+from rollcli.run.plan import Plan
 from rollcli.run.progress import RunSummary
 from rollcli.run.result_file import Inputs, data_of, row_lines
 from rollcli.stereo.options import StereoOptions
@@ -74,11 +82,8 @@ class RunRecord:
         self._begun = False
         # older images, now and after a resume
         self.replaces = options.running.overwrite or options.result.update
-        self.fixed = {
-            "rollcli": __version__,
-            "options": _effective(plan),
-            "inputs": names_of(plan.frames),
-        }
+        inputs = names_of(plan.frames)
+        self.fixed = dict[str, Any](rollcli=__version__, options=_effective(plan), inputs=inputs)
         if options.calibration.given:
             self.fixed["calibration"] = _calibrations(plan.frames)
 
@@ -247,14 +252,12 @@ class KeptRows:
         How many they are, holes included.
     errors : list of int
         Positions, from 0, of those without an angle.
-    holes : list of range
+    holes : list of int
         Positions before others that have no row: parts that workers had not written.
     again : list of int
         Positions of those whose frames are done again: they have failed, have changed, or are not done yet.
-    changed : int
-        How many frames hold something else than their rows were made from.
-    first_changed : str
-        The file of the first of them; empty where there is none.
+    changed : list of str
+        The files of frames that hold something else than their rows were made from.
     gone : int
         How many rows have left the result, since their frames are gone.
     incomplete : list of Frame
@@ -265,8 +268,9 @@ class KeptRows:
     """
 
     def __init__(self, plan: Plan, rows: Iterable[Row] = (), inputs: Inputs | None = None) -> None:
-        self.count, self.changed, self.first_changed, self.gone = 0, 0, "", 0
-        self.holes: list[range] = []
+        self.count, self.gone = 0, 0
+        self.changed: list[str] = []
+        self.holes: list[int] = []
         self.errors: list[int] = []
         self.again: list[int] = []
         self.incomplete: list[Frame] = []
@@ -303,12 +307,11 @@ class KeptRows:
                 elif not self.inputs.take(frame):
                     return False
                 if not is_again and self.inputs.has_changed(frame):
-                    self.changed += 1
-                    self.first_changed = self.first_changed or frame.file
+                    self.changed.append(frame.file)
                     is_again = True
             if row.status != "error" and not is_again:
                 images = possible_paths(frame, self._images)
-                if not all(any(path in self._made for path in paths) for paths in images):
+                if not all(any(path in self._made for path in paths) for _, paths in images):
                     self.incomplete.append(frame)
         if row.status == "error":
             self.errors.append(self.count)
@@ -322,15 +325,15 @@ class KeptRows:
 
     def notes(self) -> Iterator[str]:
         """Yield what is said of an update before it begins."""
-        if self.changed:
-            yield f"frames that are done again, since what they were made from has changed: {self.changed}"
+        if changed := len(self.changed):
+            yield f"frames that are done again, since what they were made from has changed: {changed}"
         if self.gone:
             yield f"frames that are gone, whose rows leave the result and whose images stay: {self.gone}"
 
     def skip_to(self, position: int) -> None:
         """Leave a hole before the row at a position."""
         if position > self.count:
-            self.holes.append(range(self.count, position))
+            self.holes += range(self.count, position)
             self.summary.leave_places([frame.file for frame in self._frames[self.count : position]])
             self.count, self._following = position, iter(self._frames[position:])
 
@@ -353,8 +356,6 @@ def arranged(data: bytes, plan: Plan) -> tuple[bytes, int]:
     bytes, int
         The result; and how many rows have left it, since their frames are gone.
     """
-    if _is_in_order(data, plan):
-        return data, 0
     lines = row_lines(io.BytesIO(data), plan.format)
     header = next(lines) if plan.format == "csv" else b""
     places, ends, end = dict[int, int](), [len(header)], len(header)
@@ -374,27 +375,54 @@ def arranged(data: bytes, plan: Plan) -> tuple[bytes, int]:
     return b"".join(pieces), len(places)
 
 
-def _is_in_order(data: bytes, plan: Plan) -> bool:
-    """Tell whether each row is of the frame in its place."""
-    frames = iter(plan.frames)
-    for row in parse_rows(data, plan.output):
-        frame = next(frames, None)
-        if frame is None or (frame.file, frame.right_file) != (row.file, row.right_file):
-            return False
-    return True
+class RecordedOutput(ABC):
+    """What a file and a folder of parts have in common: the record of the run, and rows in place of others.
 
-
-def check_restored(batch: Batch) -> None:
-    """Check that the images of kept rows were made again.
-
-    Raises
-    ------
-    OutputError
-        They could not be: a row no longer holds.
+    Attributes
+    ----------
+    record : RunRecord
+        FILE.run.json.
+    kept : KeptRows
+        What is known of the rows of an interrupted run, which is resumed.
     """
-    for row in (result.row for result in batch.told):
-        if row.status == "error":
-            raise OutputError(f"the images of {row.file} cannot be made again: {row.message}")
+
+    def __init__(self, record: RunRecord, kept: KeptRows) -> None:
+        self.record, self.kept, self._plan = record, kept, record.plan
+        self._replacing: dict[int, tuple[bytes, bytes]] = {}  # rows, and the lines of their inputs
+
+    def restore(self, frames: Sequence[Frame], batch: Batch) -> None:
+        """Take the images of incomplete frames, which were made again.
+
+        Raises
+        ------
+        OutputError
+            They could not be made: a row no longer holds.
+        """
+        for row in (result.row for result in batch.told):
+            if row.status == "error":
+                raise OutputError(f"the images of {row.file} cannot be made again: {row.message}")
+        self._take_images(frames, batch.figures.status)
+
+    def replace(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
+        """Take rows in the place of kept ones, and their images; positions increase.
+
+        `commit` writes them all at once.
+        """
+        self.record.saw(batch.read_as)
+        self._replacing.update(zip(positions, zip(batch.lines, batch.notes, strict=True), strict=True))
+        self._take_images(frames, batch.figures.status)
+
+    def _take_images(self, frames: Sequence[Frame], status: bytes) -> None:
+        self._keep_images(local_images(frames, status, self._plan.options.images))
+
+    @abstractmethod
+    def _keep_images(self, images: Iterable[str]) -> None:
+        """Have images forced to the disk before the rows that come next are written."""
+
+    def _end_replacing(self) -> None:
+        """Forget the rows that are written, and what told their images from those of other programs."""
+        remove_marks([self._plan.frames[at] for at in self._replacing], self._plan.options.images)
+        self._replacing.clear()
 
 
 def new_record(plan: Plan, kept: KeptRows) -> RunRecord:
@@ -406,76 +434,54 @@ def new_record(plan: Plan, kept: KeptRows) -> RunRecord:
         It cannot be continued; says what differs. Or it is a first start, and there are images already.
     """
     record = RunRecord(plan)
-    if not kept.count:
-        if plan.options.result.resume:
-            _start_or_continue(record, plan, kept)
+    if not (kept.count or plan.options.result.resume):
         return record
     try:
         earlier = read_run(plan.output)
+        found = next(_differences(kept, earlier, record), "")
     except InputError as error:
-        raise not_resumable(plan.output, str(error)) from error
-    if earlier is None:
-        raise not_resumable(plan.output, f"there is no {base_name(run_path(plan.output))}")
-    if not _is_whole(earlier):
-        raise not_resumable(plan.output, f"{base_name(run_path(plan.output))} is damaged")
-    if plan.options.result.update:
-        found = differences(earlier, record.fixed)
-    else:
-        begun = begun_plan(plan, earlier)
-        same = record if begun is plan else RunRecord(begun)
-        found = _differences(kept, earlier, same.fixed, begun, len(plan.frames) - len(begun.frames))
-    for difference in found:
-        raise not_resumable(plan.output, difference)
-    record.continue_from(earlier)
+        found = str(error)
+    if found and kept.count:
+        raise not_resumable(plan.output, found)
+    if found:
+        check_nothing_is_there(images_of(plan.frames, plan.options.images))  # those of another run
+    elif earlier is not None:
+        record.continue_from(earlier)
     return record
 
 
-def begun_plan(plan: Plan, run: Mapping[str, Any] | None) -> Plan:
-    """Return the plan without the frames that have been added since a run began, if these sort last."""
-    inputs = (run or {}).get("inputs")
-    count = inputs.get("frames") if isinstance(inputs, dict) else None
-    if not isinstance(count, int) or not 0 < count < len(plan.frames):
-        return plan
-    return replace(plan, frames=plan.frames[:count])
-
-
-def _start_or_continue(record: RunRecord, plan: Plan, kept: KeptRows) -> None:
-    """Find out what a resume without rows is: a first start, or the same run, which had got no further.
-
-    Raises
-    ------
-    UsageError
-        A first start, and there are images: they belong to another run.
-    """
-    try:
-        run = read_run(plan.output)
-    except InputError:
-        run = None
-    if run is not None and _is_whole(run) and not any(_differences(kept, run, record.fixed, plan, 0)):
-        record.continue_from(run)
-    else:
-        check_nothing_is_there(images_of(plan.frames, plan.options))
-
-
-def _differences(
-    kept: KeptRows, was: Mapping[str, Any], now: Mapping[str, Any], plan: Plan, added: int
-) -> Iterator[str]:
+def _differences(kept: KeptRows, was: Mapping[str, Any] | None, record: RunRecord) -> Iterator[str]:
+    """Yield what keeps a run with this record from being continued by another one, in words."""
+    plan, now = record.plan, record.fixed
+    if was is None:
+        yield f"there is no {base_name(run_path(plan.output))}"
+        return
+    if not _is_whole(was):
+        yield f"{base_name(run_path(plan.output))} is damaged"
+        return
     yield from differences(was, now)
+    if plan.options.result.update:
+        return
+    frames, count = plan.frames, was["inputs"].get("frames")
+    grown = isinstance(count, int) and 0 < count < len(frames)
+    if grown:  # what has been added sorts last, or the names differ
+        frames = frames[:count]
+        now = RunRecord(replace(plan, frames=frames)).fixed
     if was.get("calibration") != json.loads(json.dumps(now.get("calibration"))):
         yield "the calibration differs"
-    hint = "; new frames must sort last, or be added by --update" if added else ""
+    hint = "; new frames must sort last, or be added by --update" if grown else ""
     if kept.mismatch:
         yield f"the inputs differ: {kept.mismatch}{hint}"
-    if kept.count > len(plan.frames):
-        yield f"it has {kept.count} rows, and there are {len(plan.frames)} frames"
+    if kept.count > len(frames):
+        yield f"it has {kept.count} rows, and there are {len(frames)} frames"
     inputs_was, inputs_now = was["inputs"], now["inputs"]
     if inputs_was.get("frames") != inputs_now["frames"]:
         yield f"it was begun with {inputs_was.get('frames')} frames, now there are {inputs_now['frames']}"
     if inputs_was.get("names") != inputs_now["names"]:
         yield f"the names of the inputs differ{hint}"
-    if kept.first_changed:
+    if kept.changed:
         how = "" if plan.in_parts else "; --update does again what has changed"
-        yield f"{kept.first_changed} has changed since{how}"
+        yield f"{kept.changed[0]} has changed since{how}"
 
 
 _LISTS = {"encoding": str, "disparities_searched_px": int}

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -36,35 +36,13 @@ from rollcli.stereo.row_fit import ColumnEvidence, column_support
 COLUMNS = (*QUANTITY_COLUMNS, *SIZE)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Source:
-    """Frames, and what is to be said about where they are from.
-
-    Attributes
-    ----------
-    frames : RigFrames
-    missing : str
-        Why frames of the run are not there; empty when all are.
-    notes : tuple of str
-        Lines for stderr.
-    """
-
-    frames: RigFrames
-    missing: str
-    notes: tuple[str, ...]
-
-
-def read_source(paths: Sequence[str]) -> Source:
-    """Read one result, the shards of one run, or results of several.
-
-    Parameters
-    ----------
-    paths : sequence of str
-        Results as `rollcli estimate` wrote them, in any order.
+def _assessed(paths: Sequence[str], options: RigOptions) -> tuple[RigAssessment, str, list[str]]:
+    """Assess the rig of one result, of the shards of one run, or of several results, in any order.
 
     Returns
     -------
-    Source
+    RigAssessment, str, list of str
+        The rig; why frames of the run are not there, empty when all are; and lines for stderr.
 
     Raises
     ------
@@ -84,17 +62,16 @@ def read_source(paths: Sequence[str]) -> Source:
     order = order_of(parts)
     joined = [file for part in parts for file in part.files]
     status = np.concatenate([part.status for part in parts])[order]
-    return Source(
-        RigFrames(
-            [joined[place] for place in order] if len(parts) > 1 else joined,
-            status == STATUSES.index("ok"),
-            status == STATUSES.index("suspect"),
-            {name: _joined(parts, name)[order] for name in COLUMNS if any(name in p.numbers for p in parts)},
-            origins_of(parts),
-        ),
-        _unfinished(parts),
-        tuple(_notes(parts)),
+    frames = RigFrames(
+        [joined[place] for place in order] if len(parts) > 1 else joined,
+        status == STATUSES.index("ok"),
+        status == STATUSES.index("suspect"),
+        {name: _joined(parts, name)[order] for name in COLUMNS if any(name in p.numbers for p in parts)},
+        origins_of(parts),
     )
+    rig = assess_frames(frames, include_suspect=options.include_suspect, groups=options.groups)
+    missing = _unfinished(parts)
+    return rig, missing, [*_notes(parts), *filter(None, [missing])]
 
 
 def _joined(parts: Sequence[ResultColumns], name: str) -> NDArray[np.float64]:
@@ -258,16 +235,13 @@ def run_rig(options: RigOptions) -> int:
     check_options(options.gates)
     if listed_only(reads, writes, options.running):
         return 0
-    source = read_source(options.results)
-    rig, missing, after, changes = _assessed(source, options), source.missing, None, dict[str, Estimate]()
-    sources = [source]
+    rig, missing, notes = _assessed(options.results, options)
+    after, changes = None, dict[str, Estimate]()
     if options.against is not None:
-        later = read_source([options.against])
-        sources.append(later)
-        missing, after = missing or later.missing, _assessed(later, options)
+        after, later, more = _assessed([options.against], options)
+        missing, notes = missing or later, [*notes, *more]
         changes = {each.name: difference(rig.now(each), after.now(each)) for each in QUANTITIES}
-    given = options.calibration
-    health = health_of(rig, Calibrations(given).of(rig.frames.files[-1]) if given.given else None)
+    health = health_of(rig, Calibrations(options.calibration).of(rig.frames.files[-1]))
     checks = run_checks(rig, options.gates, missing, changes.get(ROLL.name), health)
     found = Findings(rig, checks, after, changes, health)
     overwrite = options.running.overwrite
@@ -280,17 +254,12 @@ def run_rig(options: RigOptions) -> int:
             say(f"{options.correction}: {NO_COLUMNS}")
         write_output(options.correction, correction, overwrite=overwrite)
     if not options.running.quiet:
-        for each in sources:
-            say(*filter(None, [*each.notes, each.missing]))
+        say(*notes)
         if options.format != "table" or not is_stream(options.output):
             say(*findings(rig))
     said = {False: "FAILED", None: "cannot tell"}
     say(*(f"{said[check.ok]}: {check.message}" for check in checks if not check.ok))
     return status_of(checks)
-
-
-def _assessed(source: Source, options: RigOptions) -> RigAssessment:
-    return assess_frames(source.frames, include_suspect=options.include_suspect, groups=options.groups)
 
 
 _PAIRS = 24  # matched again, a few seconds: 8 of rendered roads tell a scale to 0.02 %, one to 0.1

@@ -279,32 +279,29 @@ def _expected(
     name = f"expect-{quantity.name}"
     found = drive.quantities.get(quantity.name)
     if found is None or not found.used:
-        frames = _frames(rig, drive)
-        yield Check(name, None, f"the {quantity.name} of {frames} is unknown: no frame counts")
+        yield Check(name, None, f"the {quantity.name} of {_frames(rig, drive)} is unknown: no frame counts")
         return
     last = found.segments[-1]
+    ends = [(last.first, last.last, last.mean)]
     if found.drifts:
-        ends = [
-            (_frames(rig, drive, at, at), value)
-            for at, value in ((last.first, last.begin), (last.last, last.end))
-        ]
-    else:
-        ends = [(_frames(rig, drive, last.first, last.last), last.mean)]
-    for frames, value in ends:
+        ends = [(last.first, last.first, last.begin), (last.last, last.last, last.end)]
+    for first, end, value in ends:
+        of = f"{'at' if found.drifts else 'of'} {_frames(rig, drive, first, end)}"
+        what = f"the {quantity.name} {of} is {answer(value, quantity)}"
         limit = f"{within:g}{quantity.unit} from {wanted:g}{quantity.unit}"
-        what = f"the {quantity.name} {'at' if found.drifts else 'of'} {frames} is {answer(value, quantity)}"
-        if value.ci95 is None or value.value is None:
-            yield Check(name, None, f"{what}: {too_few(found)}")
-        else:
-            off = abs(value.value - wanted)
-            yield _told(name, what, off, value.ci95, within, limit)
+        yield _told(name, what, value, within, limit, too_few(found), wanted)
 
 
-def _told(name: str, what: str, size: float, half: float, most: float, limit: str) -> Check:
-    """Compare a size and its half-width with a limit."""
-    if size + half <= most:
+def _told(
+    name: str, what: str, found: Estimate, most: float, limit: str, why: str, wanted: float = 0.0
+) -> Check:
+    """Compare with a limit how far an estimate is from what is wanted; `why`: it may have no interval."""
+    if found.value is None or found.ci95 is None:
+        return Check(name, None, f"{what}: {why}")
+    off = abs(found.value - wanted)
+    if off + found.ci95 <= most:
         return Check(name, True, f"{what}, at most {limit}")
-    if size - half > most:
+    if off - found.ci95 > most:
         return Check(name, False, f"{what}, more than {limit}")
     return Check(name, None, f"{what}, which may be more or less than {limit}")
 
@@ -330,21 +327,17 @@ def _jumps(rig: RigAssessment, drive: DriveAssessment, limit: float) -> Check:
 
 def _limited(name: str, what: str, found: Estimate, limit: float, why: str = "too few frames") -> Check:
     """Check a change that must not be larger than a limit."""
-    if found.value is None or found.ci95 is None:
-        return Check(name, None, f"the {what}: {why}")
-    said = f"the {what} is {answer(found, change=True)}"
-    return _told(name, said, abs(found.value), found.ci95, limit, f"{limit:g}°")
+    known = found.value is not None and found.ci95 is not None
+    said = f"the {what} is {answer(found, change=True)}" if known else f"the {what}"
+    return _told(name, said, found, limit, f"{limit:g}°", why)
 
 
 def _misalignment(health: Health | None, limit: float) -> Check:
     name = "max-misalignment"
     if health is None:
         return Check(name, None, "how the views lie: no pair was measured")
-    reach = health.reach
-    what = f"the largest vertical shift between the views is {answer(reach, PIXELS)}"
-    if reach.value is None or reach.ci95 is None:
-        return Check(name, None, f"{what}: too few pairs for an interval")
-    return _told(name, what, reach.value, reach.ci95, limit, f"{limit:g} px")
+    what = f"the largest vertical shift between the views is {answer(health.reach, PIXELS)}"
+    return _told(name, what, health.reach, limit, f"{limit:g} px", "too few pairs for an interval")
 
 
 def _share(rig: RigAssessment, least: float) -> Check:

@@ -194,6 +194,11 @@ FORMATS = {"table": as_table, "csv": as_csv, "json": as_json}
 
 def _lines(found: Findings) -> Iterator[str]:
     rig = found.rig
+    jumps = [
+        f"{answer(jump.change, change=True)} at {frame_name(rig, drive, jump.frame)}"
+        for drive in rig.drives
+        for jump in drive.quantities[ROLL.name].jumps
+    ]
     for quantity in QUANTITIES:
         if quantity is ROLL or rig.latest(quantity) is not None:
             now = f"{answer(rig.now(quantity), quantity)} {now_in_words(rig, quantity)}".rstrip()
@@ -204,11 +209,13 @@ def _lines(found: Findings) -> Iterator[str]:
         if found_roll.drift.ci95 is not None:
             drifts = drift_in_words(rig, drive, over=over or "the drive")
             yield f"drift   {drifts}" + ("" if found_roll.drifts else ": none is seen")
-        yield f"jumps   {_jump_count(rig)}"
-    yield from (f"        {line}" for line in _roll_jumps(rig))
+        # none only where every drive has frames enough to tell
+        told = all(drive.quantities[ROLL.name].now.ci95 is not None for drive in rig.drives)
+        yield f"jumps   {len(jumps) or ('none' if told else 'too few frames to tell')}"
+    yield from (f"        {line}" for line in jumps)
     yield from _segment_lines(rig)
-    for name, change in found.changes.items():
-        yield from _moved(name, change)
+    for quantity in QUANTITIES if found.changes else ():
+        yield from _moved(quantity, found.changes[quantity.name])
     if found.health is not None:
         yield from found.health.lines()
     sentences = findings(rig, roll=False)
@@ -216,20 +223,6 @@ def _lines(found: Findings) -> Iterator[str]:
         yield ""
     yield from sentences
     yield from (f"ok: {check.message}" for check in found.checks if check.ok)
-
-
-def _jump_count(rig: RigAssessment) -> str:
-    """How many jumps of the roll there are; none only where every drive has frames enough to tell."""
-    told = all(drive.quantities[ROLL.name].now.ci95 is not None for drive in rig.drives)
-    return str(len(_roll_jumps(rig)) or ("none" if told else "too few frames to tell"))
-
-
-def _roll_jumps(rig: RigAssessment) -> list[str]:
-    return [
-        f"{answer(jump.change, change=True)} at {frame_name(rig, drive, jump.frame)}"
-        for drive in rig.drives
-        for jump in drive.quantities[ROLL.name].jumps
-    ]
 
 
 def _segment_lines(rig: RigAssessment) -> Iterator[str]:
@@ -248,13 +241,13 @@ def _segment_lines(rig: RigAssessment) -> Iterator[str]:
         yield f"and {len(rows) - _SEGMENTS_SHOWN:,} more segments; --format csv lists all"
 
 
-def _moved(name: str, change: Estimate) -> Iterator[str]:
+def _moved(quantity: Quantity, change: Estimate) -> Iterator[str]:
     """Whether the rig has moved from one result to the other."""
     if change.value is None:
         return
-    quantity = next(each for each in QUANTITIES if each.name == name)
     told = {True: "it has moved", False: "no move is seen", None: "too few frames for an interval"}
-    yield f"{name} against the other result: {answer(change, quantity, change=True)}, {told[moved(change)]}"
+    said = answer(change, quantity, change=True)
+    yield f"{quantity.name} against the other result: {said}, {told[moved(change)]}"
 
 
 _CALL = (

@@ -15,7 +15,7 @@ from rollcli.run.batch import BatchOptions, Parts, join_results
 from rollcli.run.frame import Frame, FrameResult, ReadAs
 from rollcli.run.options import FrameOptions
 from rollcli.run.result_file import inputs_line
-from rollcli.run.workers.chunks import Chunks, Done, Span
+from rollcli.run.workers.chunks import Chunks, Done, Span, Work
 from tests.object_store import joined
 from tests.run_cli import contents, rollcli, started, wait_until, write_maps
 from tests.slow import mostly_slow
@@ -84,7 +84,7 @@ def test_a_part_that_a_dying_worker_had_written_counts_and_another_runs_does_not
     ("rows", "seconds"), [(1000, 0.001), (1000, 0.005), (7, 0.005), (1000, 0.1), (1, 0.1)]
 )
 def test_chunks_are_whole_parts_or_pieces_of_one(rows, seconds):
-    chunks = Chunks(range(40_000), unit=rows)
+    chunks = Chunks(range(40_000), 1, Work(str, str, unit=rows))
     sizes = []
     while chunk := chunks.take(2):
         pieces = {task // rows for task in chunk}

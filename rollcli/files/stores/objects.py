@@ -74,6 +74,8 @@ def reason_of(error: Exception) -> str:
     for code, meaning in _CODES.items():
         if f"<Code>{code}</Code>" in text:
             return meaning
+    if isinstance(error, FileNotFoundError):
+        return NO_OBJECT
     if any(each in text for each in _NO_KEYS):
         return "no keys are given; set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or the store's own"
     if _REDIRECT.search(text):
@@ -94,13 +96,6 @@ def reason_of(error: Exception) -> str:
 def _without_names(error: Exception) -> str:
     """Return what an error says without names of buckets and objects: hosts stay, and codes of answers."""
     return _ELEMENT.sub("", _PATH.sub(r"\1", str(error)))
-
-
-def what_is_missing(error: Exception) -> str:
-    """Tell a bucket that does not exist from an object."""
-    text = _without_names(error)
-    missing = any(f"<Code>{each}</Code>" in text for each in ("NoSuchBucket", "ContainerNotFound"))
-    return _NO_BUCKET if missing else NO_OBJECT
 
 
 def is_final(error: Exception) -> bool:
@@ -159,7 +154,7 @@ def read_object(url: str, most: int = MOST_BYTES) -> tuple[bytes, str]:
         return _repeated(fetch)
 
 
-def write_object(url: str, data: bytes, owner: str = "") -> None:
+def write_object(url: str, data: bytes, owner: str = "", mode: str = "overwrite") -> None:
     """Write an object, whole or not at all; an existing one is replaced. `owner` names who writes.
 
     Raises
@@ -167,7 +162,10 @@ def write_object(url: str, data: bytes, owner: str = "") -> None:
     OutputError
         The store does not take it.
     """
-    _put(url, data, "overwrite", {_OWNER: owner} if owner else None)
+    store, key = _open(url)
+    attributes = {_OWNER: owner} if owner else None
+    with _telling(url, "written", OutputError), waiting_for_network():
+        _repeated(lambda: store.put(key, data, mode=mode, attributes=attributes))
 
 
 def create_object(url: str, data: bytes, owner: str) -> bool:
@@ -175,7 +173,7 @@ def create_object(url: str, data: bytes, owner: str) -> bool:
     from obstore.exceptions import AlreadyExistsError
 
     try:
-        _put(url, data, "create", {_OWNER: owner})
+        write_object(url, data, owner, mode="create")
     except AlreadyExistsError:
         return object_owner(url) == owner
     return True
@@ -227,8 +225,6 @@ def _objection(ask: Callable[[], Any]) -> str:
 
     try:
         ask()
-    except FileNotFoundError as error:
-        return what_is_missing(error)
     except (BaseError, OSError, RuntimeError) as error:
         return reason_of(error)
     return ""
@@ -269,10 +265,9 @@ def list_objects(url: str) -> Iterator[tuple[str, int, str]]:
 
 def has_objects(url: str) -> bool:
     """Return whether objects are seen below a prefix, which ends at a slash."""
-    try:
+    with contextlib.suppress(UsageError):  # who reads there says what is wrong
         return next(list_objects(url), None) is not None
-    except UsageError:  # who reads there says what is wrong
-        return False
+    return False
 
 
 def _listed(store: Any, prefix: str | None) -> Iterator[Any]:
@@ -295,12 +290,6 @@ def _listed(store: Any, prefix: str | None) -> Iterator[Any]:
         last = found[-1]["path"]
 
 
-def _put(url: str, data: bytes, mode: str, attributes: dict[str, str] | None = None) -> None:
-    store, key = _open(url)
-    with _telling(url, "written", OutputError), waiting_for_network():
-        _repeated(lambda: store.put(key, data, mode=mode, attributes=attributes))
-
-
 @contextlib.contextmanager
 def _telling(url: str, done: str, error: type[RollcliError], limits: str = "") -> Iterator[None]:
     """Turn what a store objects to into an error of ours: what cannot be `done`, and why."""
@@ -310,13 +299,11 @@ def _telling(url: str, done: str, error: type[RollcliError], limits: str = "") -
         yield
     except AlreadyExistsError:  # an answer, not a fault
         raise
-    except FileNotFoundError as missing:
-        reason = what_is_missing(missing)
-        raise error(f"{public_name(url)}: {reason}", reason) from None
     except (BaseError, OSError, RuntimeError) as fault:
         reason = reason_of(fault)
+        cannot = "" if isinstance(fault, FileNotFoundError) else f"cannot be {done}: "
         more = limits if reason == _TOO_LONG else ""
-        raise error(f"{public_name(url)}: cannot be {done}: {reason}{more}", reason) from None
+        raise error(f"{public_name(url)}: {cannot}{reason}{more}", reason) from None
 
 
 def _repeated(fetch: Callable[[], Value]) -> Value:

@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
 
 from rollcli.errors import RollcliError, raised_at
 from rollcli.files.stores.locations import computing
@@ -142,22 +142,14 @@ class Chunks(Generic[Task]):
         Chunks get smaller towards the end.
     first : int
         The size of the first ones.
-    unit : int
-        See `Work`.
-    prepare : callable, optional
-        See `Work`.
+    work : Work
+        Which tasks belong together, and whether they are prepared one by one.
     """
 
-    def __init__(
-        self,
-        tasks: Sequence[Task],
-        first: int = 1,
-        unit: int = 1,
-        prepare: Callable[[Task], Task] | None = None,
-    ) -> None:
+    def __init__(self, tasks: Sequence[Task], first: int, work: Work[Task, Any]) -> None:
         self._count = len(tasks)
-        self._tasks = iter(tasks) if prepare is None else map(prepare, tasks)
-        self._first, self._unit, self._one_by_one = first, unit, prepare is not None
+        self._tasks = iter(tasks) if work.prepare is None else map(work.prepare, tasks)
+        self._first, self._unit, self._one_by_one = first, work.unit, work.prepare is not None
         self._seconds, self._done, self._taken = _DOUBT_S, 0.0, 0
 
     def take(self, workers: int, told: Any = None) -> Span[Task]:
@@ -236,13 +228,6 @@ class Workers:
     threads: int = 1
 
 
-class _Attempt(NamedTuple):
-    """What came of a task that was begun."""
-
-    result: Any
-    error: Exception | None = None
-
-
 class Chunk(Generic[Task, Result]):
     """A chunk that a worker has in hand.
 
@@ -271,45 +256,39 @@ class Chunk(Generic[Task, Result]):
     ) -> None:
         self._do, self._join, self._tasks = do, join, tasks
         self._stopped, self._longest_s = stopped, longest_s
-        self._over, self._failed = 0.0, False
-        self._attempts: Iterable[_Attempt | None] = map(self._attempt, tasks)
+        self._over = 0.0
+        self._error: Exception | None = None
+        self._attempts: Iterable[tuple[Result, ...]] = map(self._attempt, tasks)
         if threads is not None:
             futures = [threads.submit(self._attempt_in_turn, task) for task in tasks]
-            self._all_begun = threads.submit(lambda: None)  # begins after them
             self._attempts = (future.result() for future in futures)
-
-    def wait_until_begun(self) -> None:
-        """Wait until all the tasks have begun in their threads."""
-        self._all_begun.result()
 
     def done(self) -> Done[Result]:
         """Wait for the end of the chunk; return what was done of it."""
         start = time.monotonic()
         every = list(self._attempts)  # all of them: none goes on when the worker ends
-        begun = list(itertools.takewhile(lambda attempt: attempt is not None, every))
-        error = next((each.error for each in begun if each and each.error), None)
-        results = [each.result for each in begun if each and not each.error]
+        results = list(itertools.chain(*itertools.takewhile(len, every)))
         seconds = time.monotonic() - start  # what else a chunk costs does not grow with its tasks
         try:
-            return Done(self._join(self._tasks, results) if results else [], seconds, error)
+            return Done(self._join(self._tasks, results) if results else [], seconds, self._error)
         except Exception as failed:  # noqa: BLE001 (whoever asked for the results raises it)
             return Done([], seconds, _portable(failed))
 
-    def _attempt_in_turn(self, task: Task) -> _Attempt | None:
+    def _attempt_in_turn(self, task: Task) -> tuple[Result, ...]:
         with computing():
             return self._attempt(task)
 
-    def _attempt(self, task: Task) -> _Attempt | None:
-        """Do a task; None where the chunk has ended before it."""
+    def _attempt(self, task: Task) -> tuple[Result, ...]:
+        """Do a task, and return its result; nothing where it fails, or the chunk has ended before it."""
         now = time.monotonic()
         self._over = self._over or now + self._longest_s
-        if self._stopped.is_set() or self._failed or now > self._over:
-            return None
+        if self._stopped.is_set() or self._error or now > self._over:
+            return ()
         try:
-            return _Attempt(self._do(task))
+            return (self._do(task),)
         except Exception as error:  # noqa: BLE001 (whoever asked for the result raises it)
-            self._failed = True
-            return _Attempt(None, _portable(error))
+            self._error = _portable(error)
+            return ()
 
 
 def _portable(error: Exception) -> Exception:

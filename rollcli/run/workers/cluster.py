@@ -12,6 +12,7 @@ import uuid
 import weakref
 from collections.abc import Collection, Iterator, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Generic
 
@@ -86,7 +87,6 @@ class ClusterExecutor(Generic[Task, Result]):
     """
 
     def __init__(self, given: str, work: Work[Task, Result], asked: Workers) -> None:
-        require_extra("cluster", "--scheduler")
         from distributed import KilledWorker
 
         self.worker_died: tuple[type[BaseException], ...] = (KilledWorker,)
@@ -103,7 +103,6 @@ class ClusterExecutor(Generic[Task, Result]):
             self._resources.callback(self._client.close, timeout=2)
             for worker, problem in self._look_for_workers().items():
                 raise WorkerError(f"worker {worker}: {problem}")
-            self._client.register_plugin(_worker_plugin())
         except BaseException:
             self._resources.close()
             raise
@@ -169,7 +168,7 @@ class ClusterExecutor(Generic[Task, Result]):
         """Let workers begin no further task."""
         if not self._stopped and self._client.status == "running":
             with contextlib.suppress(OSError):  # the scheduler is lost
-                self._client.run(_stop_run, self._run, on_error="ignore")
+                self._client.run(_stop_run, self._run, self.threads, on_error="ignore")
         self._stopped = True
 
     def close(self, *, at_once: bool) -> None:
@@ -252,41 +251,36 @@ class ClusterFuture(Generic[Task, Result]):
         raise WorkerError(f"{self._executor.address}: workers cannot do the work: {error}")
 
 
-class _RunHere:
-    """A run that this worker takes part in."""
-
-    def __init__(self, threads: int) -> None:
-        self.stopped = threading.Event()
-        self.threads = ThreadPoolExecutor(threads) if threads > 1 else None
-
-
-_RUNS: dict[str, _RunHere] = {}  # the last ones, by their ids
-_RUNS_KEPT = 8
 _LOCK = threading.Lock()
 
 
-def _run_here(run: str, threads: int = 1) -> _RunHere:
-    with _LOCK:
-        while run not in _RUNS and len(_RUNS) >= _RUNS_KEPT:
-            del _RUNS[next(iter(_RUNS))]
-        return _RUNS.setdefault(run, _RunHere(threads))
+@lru_cache(maxsize=8)  # the last runs
+def _made(run: str, threads: int) -> tuple[threading.Event, ThreadPoolExecutor | None]:
+    prepare_worker()
+    return threading.Event(), ThreadPoolExecutor(threads) if threads > 1 else None
 
 
-def _stop_run(run: str) -> None:
-    _run_here(run).stopped.set()
+def _run_here(run: str, threads: int) -> tuple[threading.Event, ThreadPoolExecutor | None]:
+    """Return what stops a run on this worker, and the threads of its tasks; at first, set the worker up."""
+    with _LOCK:  # or each of two threads would make its own
+        return _made(run, threads)
+
+
+def _stop_run(run: str, threads: int) -> None:
+    _run_here(run, threads)[0].set()
 
 
 def _do_chunk(version: str, run: str, told: bytes, threads: int) -> bytes:
     """Do a chunk on a worker, which begins another one while the last tasks wait for the network."""
     if version != __version__:
         raise WorkerError(_other_version(version))
-    here = _run_here(run, threads)
+    stopped, pool = _run_here(run, threads)
     do, join, tasks = pickle.loads(told)  # noqa: S301 (as Dask does)
-    chunk = Chunk(do, join, tasks, here.stopped, LONGEST_ON_CLUSTER_S, here.threads)
-    if here.threads is not None:
+    chunk = Chunk(do, join, tasks, stopped, LONGEST_ON_CLUSTER_S, pool)
+    if pool is not None:
         from distributed import secede
 
-        chunk.wait_until_begun()
+        pool.submit(lambda: None).result()  # which begins after all the tasks
         secede()
     return pickle.dumps(chunk.done(), pickle.HIGHEST_PROTOCOL)
 
@@ -345,21 +339,6 @@ def _connect(address: str) -> Any:
         client.close(timeout=1)
         raise WorkerError(f"{address}: has no workers; start some: dask worker {address}") from error
     return client
-
-
-def _worker_plugin() -> Any:
-    from distributed import WorkerPlugin
-
-    class PrepareWorker(WorkerPlugin):
-        """Sets up every worker process, also those that join later."""
-
-        name = "rollcli"
-
-        def setup(self, worker: Any) -> None:
-            """Set up the process that this worker runs in."""
-            prepare_worker()
-
-    return PrepareWorker()
 
 
 def _problems(client: Any, asked: Workers, workers: Collection[str]) -> tuple[dict[str, str], set[str]]:

@@ -31,7 +31,7 @@ def in_order(
     A chunk whose worker died is done again in halves: what kills workers is alone in the end. Once `stop` is
     requested, no further task begins; results are yielded up to the first task that was not begun.
     """
-    chunks = Chunks(tasks, executor.threads, work.unit, work.prepare)
+    chunks = Chunks(tasks, executor.threads, work)
     ahead = _AHEAD if work.prepare is None else _IN_FLIGHT
     in_flight = deque[tuple[Span[Task], Any]]()  # each with its future
     undone: list[Any] = []

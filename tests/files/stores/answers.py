@@ -149,8 +149,7 @@ def _errors():
 
 def _judged(text):
     error = Exception(text)
-    reason = objects.reason_of(error)
-    said = [reason, objects.what_is_missing(error), objects.is_final(error)]
+    said = [objects.reason_of(error), objects.reason_of(FileNotFoundError(text)), objects.is_final(error)]
     return [*said, *map(objects.holds_for_all, said[:2])]
 
 

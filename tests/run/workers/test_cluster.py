@@ -16,8 +16,8 @@ from rollcli import __version__
 from rollcli.errors import UsageError
 from rollcli.files.storage import list_names, read_bytes
 from rollcli.run.workers import cluster
-from rollcli.run.workers.chunks import Work, Workers
-from rollcli.run.workers.cluster import ClusterExecutor, check_scheduler, probe, scheduler_address
+from rollcli.run.workers.chunks import Work
+from rollcli.run.workers.cluster import check_scheduler, probe, scheduler_address
 from tests.in_process import run_here
 from tests.object_store import joined, upload
 from tests.run.workers.tasks import lost, run
@@ -383,14 +383,9 @@ def test_a_scheduler_file_that_is_not_there_or_is_none_is_refused(tmp_path, cont
     assert str(caught.value) == f"--scheduler {file}: {said}"
 
 
-@pytest.mark.parametrize(
-    "use",
-    [lambda: check_scheduler("tcp://far:1"), lambda: ClusterExecutor("tcp://far:1", WORK, Workers())],
-    ids=["check", "executor"],
-)
-def test_without_the_extra_it_is_named(monkeypatch, use):
+def test_without_the_extra_it_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(UsageError) as caught:
-        use()
+        check_scheduler("tcp://far:1")
     assert str(caught.value).startswith("--scheduler needs the extra cluster: ")
     assert str(caught.value).endswith(" -m pip install distributed")
