@@ -13,7 +13,6 @@ from rollcli.stereo.misalignment import LEVEL, ColumnSupport, Misalignment
 from rollcli.stereo.row_fit import (
     ColumnEvidence,
     MeasuredRows,
-    RowFit,
     SeenBlocks,
     column_evidence,
     column_support,
@@ -157,7 +156,8 @@ def measure_misalignment(
         before, found = found, (found + step).rounded(*disparity.shape)
         blocks.follow(step)
         enough = _SMALL_STEP if done < _UNSURE_FROM else _UNSURE_STEP
-        if reach < enough or _is_plainly_level(found, fit, disparity.shape):
+        # or the views would be level even if most of how they lie were still hidden
+        if reach < enough or is_level(found.times(_HIDDEN), fit.errors, disparity.shape):
             break
     height, width = disparity.shape
     rows = MeasuredRows(seen, before, (height, width))
@@ -298,11 +298,6 @@ def _gradients(view: Floats) -> tuple[Floats, Floats]:
         for order in ((1, 0), (0, 1))
     )
     return across, down
-
-
-def _is_plainly_level(found: Misalignment, fit: RowFit, shape: tuple[int, ...]) -> bool:
-    """Tell whether views would be level even if most of how they lie were still hidden."""
-    return is_level(found.times(_HIDDEN), fit.errors, shape)
 
 
 class Tolerance(NamedTuple):

@@ -484,20 +484,15 @@ def _settled(
     return fit._replace(spread=spread)
 
 
-def _covariance(design: Doubles, fit: _Fit, tile: NDArray[np.intp]) -> Doubles:
-    """Return the covariance of the values of a fit whose blocks err together within a tile."""
-    scores = np.stack([np.bincount(tile, each) for each in design * (fit.weight * fit.off)])
-    spread = fit.inverse @ scores
-    return spread @ spread.T
-
-
 def _variance(design: Doubles, fit: _Fit, tile: NDArray[np.intp]) -> float:
     """Return what the inverse of the normal equations is multiplied by to be a covariance of values.
 
     From well determined values: where two columns are nearly one, sums over tiles do not see the doubt.
     """
     normal = (design * fit.weight) @ design.T
-    found = BELIEF.tiles**2 * float(np.trace(normal @ _covariance(design, fit, tile))) / len(design)
+    scores = np.stack([np.bincount(tile, each) for each in design * (fit.weight * fit.off)])
+    spread = fit.inverse @ scores  # blocks err together within a tile
+    found = BELIEF.tiles**2 * float(np.trace(normal @ (spread @ spread.T))) / len(design)
     return max(found, _EXACT)
 
 
