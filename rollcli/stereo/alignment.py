@@ -223,7 +223,10 @@ class _Blocks:
         looked_at = (row[:, None] + 2 * column) % every == 0
         self.count = int(np.count_nonzero(looked_at))
         places = looked_at & (block_means(known) > _KNOWN)
-        places[places] = _may_tell(blocks_at(texture.down, places))
+        down = blocks_at(texture.down, places)
+        varies = np.einsum("ij,ij->i", down, down) / BLOCK**2 - np.square(down.mean(axis=1))
+        # of a block's squares no more is left than all of them, over a count of `_KNOWN` of it or more
+        places[places] = varies > np.float32(_LEAST * _KNOWN * _ROUNDING)
 
         self._left, self._seen = blocks_at(texture.left, places), blocks_at(known, places)
         self._across, self._down = blocks_at(texture.across, places), blocks_at(texture.down, places)
@@ -271,16 +274,6 @@ class _Blocks:
         down = step.down(self._shares.x, self._shares.y, self._near)
         moved = np.clip(self._along - self._shares.mixed * down, -_LONGEST_STEP, _LONGEST_STEP)
         self._u += moved[:, None]
-
-
-def _may_tell(down: Floats) -> NDArray[np.bool_]:
-    """Tell which blocks vary enough down the columns, whatever part of them has a disparity.
-
-    What is left of a block's squares is no more than all of them, over a count of `_KNOWN` of it or more.
-    """
-    varies = np.einsum("ij,ij->i", down, down) / BLOCK**2 - np.square(down.mean(axis=1))
-    enough: NDArray[np.bool_] = varies > np.float32(_LEAST * _KNOWN * _ROUNDING)
-    return enough
 
 
 def _smooth(view: View) -> Floats:
