@@ -110,8 +110,11 @@ class Texture(NamedTuple):
     @staticmethod
     def of(views: Views) -> "Texture":
         """Work it out; a pair that is measured again and again needs it once."""
-        left = smoothed(_smooth(views[0]))
-        return Texture(left, smoothed_between(_smooth(views[1])), *_gradients(left))
+        # by half a pixel, beside what is smoothed for grey levels between pixels: more takes away the grain
+        # that tells on an empty road, less leaves the noise
+        left, right = map(smoothed, views)
+        left = smoothed(left)
+        return Texture(left, smoothed_between(right), *_gradients(left))
 
 
 def measure_misalignment(
@@ -168,7 +171,7 @@ def textured_share(view: View) -> float:
     """Return the share of a view's blocks that could tell a vertical disparity, were they matched."""
     if min(view.shape) < BLOCK:
         return 0.0
-    across, down = _gradients(smoothed(_smooth(view)))
+    across, down = _gradients(smoothed(smoothed(view)))
     along = block_means(across * across) + np.float32(_RIDGE)
     weight = block_means(down * down) - np.square(block_means(across * down)) / along
     return float(np.mean(weight > _LEAST))
@@ -274,14 +277,6 @@ class _Blocks:
         down = step.down(self._shares.x, self._shares.y, self._near)
         moved = np.clip(self._along - self._shares.mixed * down, -_LONGEST_STEP, _LONGEST_STEP)
         self._u += moved[:, None]
-
-
-def _smooth(view: View) -> Floats:
-    """Smooth a view by half a pixel, beside what is smoothed for grey levels between pixels.
-
-    More takes away the grain that tells on an empty road, less leaves the noise.
-    """
-    return smoothed(view)
 
 
 def _gradients(view: Floats) -> tuple[Floats, Floats]:

@@ -257,9 +257,8 @@ def match_pair(
     width, first = views[0].shape[1], options.min_disparity
     if usable_range(1, first, width, options.block_size) < NARROWEST:
         raise InputError(f"images {width} px wide are too narrow to match from disparity {first} on")
-    told, small, look = options.given_alignment(width), None, FirstLook(None, None)
+    told, small, look = options.given_alignment(width), SmallViews(views, given), FirstLook(None, None)
     if options.measures_alignment:
-        small = SmallViews(views, given)
         look = first_look(small)
     elif options.num_disparities is None:
         look = look_for_range((views[0], level(views[1], told.lies)))
@@ -278,11 +277,13 @@ def match_pair(
         return match_for_road(levelled(lies))
 
     support, doubt = None, ""
-    if small is None:
+    if options.measures_alignment:
+        matched, corrected, measured, doubt = _match_levelled(match, small, look, first < 0)
+    else:
         corrected, measured, support = told.lies, None, told.columns
         matched = match(corrected)
         if options.checks_alignment:
-            measured = SmallViews(views, given).measure(matched, corrected)
+            measured = small.measure(matched, corrected)
         if measured is not None:
             lies, errors = measured.misalignment, measured.errors
             # but for what refinement takes away
@@ -290,8 +291,6 @@ def match_pair(
                 corrected = told.of_pair(lies.offset, errors.offset).rounded(*views[0].shape)
             else:
                 doubt = CONTRADICTS
-    else:
-        matched, corrected, measured, doubt = _match_levelled(match, small, look, first < 0)
     if corrected == LEVEL:
         support = NOTHING_KNOWN
     elif support is None:
