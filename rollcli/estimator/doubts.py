@@ -124,8 +124,7 @@ def _ground_of(checked: CheckedMap, surface: Surface, rmse: float, reach: float)
     height, width = checked.values.shape
     step = -(-width // _COLUMNS)
     model, grid = surface.model, surface.grid
-    x = (np.arange(0, width, step) - grid.centre_u) / grid.scale
-    y = ((np.arange(0, height, step) - grid.centre_v) / grid.scale)[:, None]
+    x, y = grid.normalised(np.arange(0, width, step), np.arange(0, height, step)[:, None])
     road = model.disparity_along(model.along(x, y))
     d, valid = checked.values[::step, ::step], checked.valid[::step, ::step]
     lane = (road > 0) & (np.abs(model.side(model.across(x, y), road)) < 1)

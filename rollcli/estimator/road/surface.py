@@ -106,8 +106,7 @@ class Surface:
     def _covers(self, disparity: NDArray[Any], first: int, reach: int, tuning: Tuning) -> NDArray[np.bool_]:
         """Return the same of some rows, from `first` on: they are compared with those `reach` away."""
         rows, columns = (np.arange(side, dtype=np.float64) for side in disparity.shape)
-        x: Floats = (columns - self.grid.centre_u) / self.grid.scale
-        y: Floats = ((rows + first - self.grid.centre_v) / self.grid.scale)[:, None]
+        x, y = self.grid.normalised(columns, rows[:, None] + first)
         road = self.model.disparity(x, y)
         tolerance = tolerance_of(disparity, self.noise, tuning.sample)
         on_it: NDArray[np.bool_] = np.abs(road - disparity) < self.limit * tolerance
