@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rollcli.estimator.doubts import Evidence, View, doubts_of
+from rollcli.estimator.doubts import doubts_of
 from rollcli.estimator.interval import Tangent, interval_of, jackknife, touch
 from rollcli.estimator.moments import CheckedMap, Grid
 from rollcli.estimator.request import AREAS, DEFAULT_REQUEST, Request
@@ -196,21 +196,20 @@ def estimate_roll(
     tangent = touch(alpha, theta, Grid.of_shape(height, width), surface, knife)
     turned = tangent.turned_by(request.slope_error)
     interval = None if knife is None else interval_of(knife, theta, turned, tuning.interval)
-    rmse = pixels.energy.rmse(certified.energy)
-    view = None
-    if pixels.road and surface:
-        view = View(checked.values, checked.valid, surface, rmse, tuning.doubts.reach)
-    doubts = doubts_of(Evidence(pixels, request, certified, interval, view), tuning.doubts)
+    doubts, notes = list(doubts_of(checked, pixels, certified, interval, request)), []
+    if certified.replaced is not None:
+        replaced = math.degrees(certified.replaced)
+        notes = [f"replaced the minimum that {request.method} found, {replaced:.4f} degrees"]
     return RollEstimate(
         theta=theta,
         ci95=None if interval is None else interval.half_width,
         status="suspect" if doubts else "ok",
-        message="; ".join(doubts + _notes(certified, request)),
+        message="; ".join(doubts + notes),
         method=request.method,
         iterations=certified.solution.iterations,
         converged=certified.solution.status.converged,
         global_minimum=None if request.method in AREAS else certified.is_global,
-        rmse=rmse,
+        rmse=pixels.energy.rmse(certified.energy),
         alpha=alpha,
         valid_fraction=checked.count / checked.values.size,
         road_fraction=pixels.share,
@@ -229,10 +228,3 @@ def _solve(pixels: PixelSet, request: Request) -> CertifiedSolution:
     solution = load_solver(request.method)(pixels.energy, request.solver)
     road_theta = pixels.surface.model.theta if pixels.road and pixels.surface else None
     return certify(pixels.energy, solution, road_theta, request.tolerance)
-
-
-def _notes(certified: CertifiedSolution, request: Request) -> list[str]:
-    if certified.replaced is None:
-        return []
-    replaced = math.degrees(certified.replaced)
-    return [f"replaced the minimum that {request.method} found, {replaced:.4f} degrees"]

@@ -3,7 +3,6 @@
 import itertools
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,18 +101,13 @@ def interval_of(jackknife: Jackknife, theta: float, turned: float, tuning: Inter
 
 
 def noise_of(jackknife: Jackknife, theta: float, tuning: IntervalTuning) -> float:
-    """Return the half-width that noise and misfit make at a roll, radians, before `tuning.factor`."""
-    bands, columns, white = jackknife.spreads()
-    return slant(theta, tuning) * math.hypot(bands, columns, tuning.white * white)
-
-
-def slant(theta: float, tuning: IntervalTuning) -> float:
-    """Return how much wider the interval is at a roll, radians: 1 at none, 2 at a right angle.
+    """Return the half-width that noise and misfit make at a roll, radians, before `tuning.factor`.
 
     A matcher takes the disparity for constant within its block. The more a rolled road's disparity changes
     along the rows, the more that errs; these errors are smooth and do not show in the residuals.
     """
-    return 1 + tuning.slant * abs(math.sin(theta))
+    bands, columns, white = jackknife.spreads()
+    return (1 + tuning.slant * abs(math.sin(theta))) * math.hypot(bands, columns, tuning.white * white)
 
 
 def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackknife:
@@ -148,50 +142,41 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
     rows *= np.sqrt(weights)  # from here on all products are weighted
 
     leverage = np.square(rows[3])
-    bands = _by_group(rows, along, None, tuning.groups)
-    columns = _by_group(rows, across, leverage, tuning.groups)
-    total = bands.products.sum(0)
-    found = _solved(total, np.concatenate([bands.products, columns.products]), prior)
-    uneven = _unevenness(heights, leverage, bands, columns, tuning.levelled)
-    view = _view_width(surface.grid, theta) * abs(model.alpha[1]) / nearest
+    bands, in_bands = _by_group(rows, along, None, tuning.groups)
+    columns, in_columns = _by_group(rows, across, leverage, tuning.groups)
+    quarter = in_bands * (2 * tuning.groups) + in_columns
+    uneven = _unevenness(heights, leverage, quarter, tuning.groups, tuning.levelled)
+    cosine, sine, grid = abs(math.cos(theta)), abs(math.sin(theta)), surface.grid
+    view = 2 * (grid.centre_u * cosine + grid.centre_v * sine) / grid.scale  # how wide it is across the road
 
-    white: Floats = found.inverse * _white(total, found.whole, tuning)
+    total = bands.sum(0)
+    inverse, whole, changes, bulge = _solved(total, np.concatenate([bands, columns]), prior)
+    weight, rest = float(total[0, 0]), max(0.0, float(total[5, 5] - whole.dot(total[:5, 5])))
+    # the variance of a pixel, times how many repeat each other
+    white: Floats = inverse * (rest / weight * max(1.0, weight / tuning.independent_pixels))
     if not surface.parabolic:  # there is no a2 to err
         white[2] = white[:, 2] = 0
+    prior_share = prior * float(inverse[_CAMBER, _CAMBER])
     return Jackknife(
-        bands=found.changes[: tuning.groups, :_CAMBER],
-        columns=found.changes[tuning.groups :, :_CAMBER],
+        bands=changes[: tuning.groups, :_CAMBER],
+        columns=changes[tuning.groups :, :_CAMBER],
         white=white[:4, :4],
-        freedom=(_freedom(bands.products), _freedom(columns.products)),
-        uneven=uneven / view,
-        bend=abs(model.camber * float(found.bulge[_THETA])),
-        camber=_camber(model, prior * float(found.inverse[_CAMBER, _CAMBER]), found.changes[:, _CAMBER])
-        if cambered
-        else None,
+        freedom=(_freedom(bands), _freedom(columns)),
+        uneven=uneven / (view * abs(model.alpha[1]) / nearest),
+        bend=abs(model.camber * float(bulge[_THETA])),
+        camber=_camber(model, prior_share, changes[:, _CAMBER]) if cambered else None,
     )
 
 
-def _view_width(grid: Grid, theta: float) -> float:
-    """Return how wide the view is across a road of this roll, units."""
-    return 2 * (grid.centre_u * abs(math.cos(theta)) + grid.centre_v * abs(math.sin(theta))) / grid.scale
-
-
-class _Groups(NamedTuple):
-    """Groups of pixels: the products (groups, 6, 6) of each, and in which half group (N,) each pixel is."""
-
-    products: Floats
-    half: NDArray[np.intp]
-
-
-def _unevenness(heights: Reals, leverage: Reals, bands: _Groups, columns: _Groups, factor: float) -> float:
+def _unevenness(
+    heights: Reals, leverage: Reals, quarter: NDArray[np.intp], groups: int, factor: float
+) -> float:
     """Return the root mean square of the patches' mean heights, in the unit of `heights`.
 
-    A patch is what a band and a column have in common, and counts as much as it turns the road. Noise falls
-    by `factor` from a quarter of a patch to the whole, an uneven road's heights hardly do: that tells them
-    apart.
+    A patch is what a band and a column have in common, and counts as much as it turns the road; `quarter`
+    (N,) says in which quarter of which patch each pixel is. Noise falls by `factor` from a quarter of a patch
+    to the whole, an uneven road's heights hardly do: that tells them apart.
     """
-    groups = len(bands.products)
-    quarter = bands.half * (2 * groups) + columns.half
 
     def sums_of(values: Reals) -> Floats:
         sums = np.bincount(quarter, values, 4 * groups**2)
@@ -207,11 +192,14 @@ def _unevenness(heights: Reals, leverage: Reals, bands: _Groups, columns: _Group
     return math.sqrt(max(0.0, uneven) / max(float(leverage.sum()), _LEAST_SPAN))
 
 
-def _by_group(rows: Reals, position: Reals, share: Reals | None, groups: int) -> _Groups:
-    """Return groups of equal total `share`, or number, cut along `position`.
+def _by_group(
+    rows: Reals, position: Reals, share: Reals | None, groups: int
+) -> tuple[Floats, NDArray[np.intp]]:
+    """Return the products (groups, 6, 6) of groups of pixels, and in which half group (N,) each pixel is.
 
-    Of the six rows five are the design's; with the sixth, the residuals, a product is a group's normal
-    equations, right-hand side included.
+    The groups have equal total `share`, or number, and are cut along `position`. Of the six rows five are the
+    design's; with the sixth, the residuals, a product is a group's normal equations, right-hand side
+    included.
     """
     order, halves = _order(position), 2 * groups
     if share is None:
@@ -226,7 +214,7 @@ def _by_group(rows: Reals, position: Reals, share: Reals | None, groups: int) ->
     products = np.empty((groups, 6, 6), np.float32)
     for product, (start, end) in zip(products, itertools.pairwise([0, *cuts[1::2], len(order)]), strict=True):
         np.dot(ordered[:, start:end], columns[start:end], out=product)
-    return _Groups(products.astype(np.float64), half)
+    return products.astype(np.float64), half
 
 
 def _order(position: Reals) -> NDArray[np.intp]:
@@ -236,11 +224,13 @@ def _order(position: Reals) -> NDArray[np.intp]:
     return steps.astype(np.uint16).argsort(kind="stable")
 
 
-class _Solutions(NamedTuple):
-    """Solutions (a0, a1, a2, theta, camber) of normal equations.
+def _solved(total: Floats, groups: Floats, prior: float) -> tuple[Floats, Floats, Floats, Floats]:
+    """Solve the normal equations (a0, a1, a2, theta, camber) of all pixels, and of all but a group.
 
-    Attributes
-    ----------
+    At once takes less time.
+
+    Returns
+    -------
     inverse : ndarray, shape (5, 5)
         Of the normal matrix of all pixels.
     whole : ndarray, shape (5,)
@@ -250,15 +240,6 @@ class _Solutions(NamedTuple):
     bulge : ndarray, shape (5,)
         What a camber of 1 adds to the others, where it is not known.
     """
-
-    inverse: Floats
-    whole: Floats
-    changes: Floats
-    bulge: Floats
-
-
-def _solved(total: Floats, groups: Floats, prior: float) -> _Solutions:
-    """Solve the normal equations of all pixels, and of all but a group. At once takes less time."""
     products = np.empty((7 + len(groups), 6, 6))
     products[:6] = products[-1] = total
     np.subtract(total, groups, out=products[6:-1])
@@ -269,15 +250,7 @@ def _solved(total: Floats, groups: Floats, prior: float) -> _Solutions:
     normal[:-1, _CAMBER, _CAMBER] += prior
     normal[-1, _CAMBER] = normal[-1, :, _CAMBER] = 0
     solutions: Floats = np.asarray(np.linalg.solve(regular(normal, normal[0]), pulls)[..., 0], np.float64)
-    inverse, whole = solutions[:5], solutions[5]
-    return _Solutions(inverse, whole, whole - solutions[6:-1], solutions[-1])
-
-
-def _white(total: Floats, whole: Floats, tuning: IntervalTuning) -> float:
-    """Return the variance of a pixel, times how many repeat each other, px^2."""
-    independent = max(1.0, float(total[0, 0]) / tuning.independent_pixels)
-    rest = max(0.0, float(total[5, 5] - whole.dot(total[:5, 5])))
-    return rest / float(total[0, 0]) * independent
+    return solutions[:5], solutions[5], solutions[5] - solutions[6:-1], solutions[-1]
 
 
 def _camber(model: RoadModel, prior_share: float, changes: Floats) -> float | None:
@@ -344,11 +317,16 @@ class Tangent:
         """
         if self.jackknife is None:
             return None
-        grid, flat = self.grid, RoadModel(self.theta, (0.0, 0.0, 0.0))
+        knife, grid = self.jackknife, self.grid
+        # the groups' errors of (a0, a1, a2, theta), and the textbook's as half-widths
+        errors = np.concatenate([knife.bands, knife.columns, _NORMAL * _roots(knife.white)])
+        e0, e1, e2, turned = errors.T
+        # there the roll turns the map about its centre, here about the top-left pixel
+        flat = RoadModel(self.theta, (0.0, 0.0, 0.0))
         row, across = (of(grid.centre_u, grid.centre_v) for of in (flat.along, flat.across))
-        return _in_pixels(
-            _errors(self.jackknife), (self.row - row) / grid.scale, grid.scale, self.slope * across
-        )
+        centre = (self.row - row) / grid.scale
+        disparity = e0 + centre * (e1 + centre * e2) + self.slope * across * turned
+        return np.stack([disparity, (e1 + 2 * centre * e2) / grid.scale, turned], axis=1)
 
     def turned_by(self, slope: float) -> float:
         """Return by how much a slope along the rows, px per px, turns this road, radians."""
@@ -421,25 +399,8 @@ def _third_power(disparity: float, slope: float, bend: float, moved: float) -> f
     return max(-most, min(most, third))
 
 
-def _errors(jackknife: Jackknife) -> Floats:
-    """Return independent errors of (a0, a1, a2, theta): the groups', and the textbook's as half-widths."""
-    return np.concatenate([jackknife.bands, jackknife.columns, 1.96 * _roots(jackknife.white)])
-
-
 def _roots(covariance: Floats) -> Floats:
     """Return independent errors, shape (4, 4), whose squares add up to a covariance."""
     sizes = np.sqrt(np.maximum(covariance.diagonal(), 0))
     shares, ways = np.linalg.eigh(covariance / np.maximum(np.outer(sizes, sizes), 1e-300))
     return np.asarray((ways * np.sqrt(np.maximum(shares, 0))).T * sizes)
-
-
-def _in_pixels(errors: Floats, centre: float, scale: float, turn: float) -> Floats:
-    """Return errors of (disparity, slope, theta), px, from those in normalised coordinates.
-
-    There the roll turns the map about its centre, here about the top-left pixel.
-    """
-    e0, e1, e2, turned = errors.T
-    disparity = e0 + centre * (e1 + centre * e2) + turn * turned
-    changes = np.empty((len(errors), 3))
-    changes[:, 0], changes[:, 1], changes[:, 2] = disparity, (e1 + 2 * centre * e2) / scale, turned
-    return changes

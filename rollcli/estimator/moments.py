@@ -61,7 +61,10 @@ class CheckedMap:
             raise UsageError(
                 f"a disparity map is a 2-D array of real numbers, not {values.ndim}-D {values.dtype}"
             )
-        usable = None if mask is None else _checked_mask(mask, values.shape)
+        usable = None if mask is None else np.asarray(mask) != 0
+        if usable is not None and usable.shape != values.shape:
+            here, there = ("x".join(map(str, each.shape[::-1])) for each in (usable, values))
+            raise UsageError(f"the mask is {here}, the map {there}: give a mask of the map's size")
         if values.dtype.kind == "f" and not values.max(initial=0) < LARGEST:  # or one is NaN
             values = np.where(values >= LARGEST, 0, values)
         valid: NDArray[np.bool_] = values > 0
@@ -126,19 +129,6 @@ def require_pixels(valid: NDArray[np.bool_]) -> int:
     return count
 
 
-def _checked_mask(mask: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    usable: NDArray[np.bool_] = np.asarray(mask) != 0
-    if usable.shape != shape:
-        raise UsageError(
-            f"the mask is {_size(usable.shape)}, the map {_size(shape)}: give a mask of the map's size"
-        )
-    return usable
-
-
-def _size(shape: tuple[int, ...]) -> str:
-    return "x".join(str(n) for n in shape[::-1])
-
-
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 
@@ -169,6 +159,10 @@ class Grid:
     def of_shape(cls, height: int, width: int) -> "Grid":
         """Return the grid of a map of this shape."""
         return cls((width - 1) / 2, (height - 1) / 2, max(width, height, 2) / 2)
+
+    def normalised(self, u: NDArray[Any], v: NDArray[Any]) -> tuple[Floats, Floats]:
+        """Return p of columns and q of rows, each an array of the shape given."""
+        return (u - self.centre_u) / self.scale, (v - self.centre_v) / self.scale
 
 
 @dataclass(frozen=True)
@@ -214,8 +208,7 @@ def map_moments(disparity: NDArray[Any], weights: NDArray[Any] | None = None) ->
     """
     height, width = disparity.shape
     grid = Grid.of_shape(height, width)
-    along = powers((np.arange(width) - grid.centre_u) / grid.scale)
-    down = powers((np.arange(height) - grid.centre_v) / grid.scale)
+    along, down = map(powers, grid.normalised(np.arange(width), np.arange(height)))
     s, t, dd = np.zeros((5, 5)), np.zeros((3, 3)), 0.0
     for rows in strips(height, _ROWS):
         block = np.fmax(disparity[rows], 0).astype(np.float64)  # fmax: NaN gives way to 0

@@ -233,8 +233,7 @@ class Textbook:
     def __init__(self, disparity: NDArray[Any]) -> None:
         grid = Grid.of_shape(*disparity.shape)
         rows, columns = np.nonzero((disparity > 0) & (disparity < np.inf))
-        self.u: NDArray[Any] = (columns - grid.centre_u) / grid.scale
-        self.v: NDArray[Any] = (rows - grid.centre_v) / grid.scale
+        self.u, self.v = grid.normalised(columns, rows)
         self.d: NDArray[Any] = disparity[rows, columns].astype(np.float64)
 
     def energy(self, theta: float) -> float:

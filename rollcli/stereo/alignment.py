@@ -13,7 +13,6 @@ from rollcli.stereo.misalignment import LEVEL, ColumnSupport, Misalignment
 from rollcli.stereo.row_fit import (
     ColumnEvidence,
     MeasuredRows,
-    RowFit,
     SeenBlocks,
     column_evidence,
     column_support,
@@ -111,8 +110,11 @@ class Texture(NamedTuple):
     @staticmethod
     def of(views: Views) -> "Texture":
         """Work it out; a pair that is measured again and again needs it once."""
-        left = smoothed(_smooth(views[0]))
-        return Texture(left, smoothed_between(_smooth(views[1])), *_gradients(left))
+        # by half a pixel, beside what is smoothed for grey levels between pixels: more takes away the grain
+        # that tells on an empty road, less leaves the noise
+        left, right = map(smoothed, views)
+        left = smoothed(left)
+        return Texture(left, smoothed_between(right), *_gradients(left))
 
 
 def measure_misalignment(
@@ -157,7 +159,8 @@ def measure_misalignment(
         before, found = found, (found + step).rounded(*disparity.shape)
         blocks.follow(step)
         enough = _SMALL_STEP if done < _UNSURE_FROM else _UNSURE_STEP
-        if reach < enough or _is_plainly_level(found, fit, disparity.shape):
+        # or the views would be level even if most of how they lie were still hidden
+        if reach < enough or is_level(found.times(_HIDDEN), fit.errors, disparity.shape):
             break
     height, width = disparity.shape
     rows = MeasuredRows(seen, before, (height, width))
@@ -168,7 +171,7 @@ def textured_share(view: View) -> float:
     """Return the share of a view's blocks that could tell a vertical disparity, were they matched."""
     if min(view.shape) < BLOCK:
         return 0.0
-    across, down = _gradients(smoothed(_smooth(view)))
+    across, down = _gradients(smoothed(smoothed(view)))
     along = block_means(across * across) + np.float32(_RIDGE)
     weight = block_means(down * down) - np.square(block_means(across * down)) / along
     return float(np.mean(weight > _LEAST))
@@ -223,7 +226,10 @@ class _Blocks:
         looked_at = (row[:, None] + 2 * column) % every == 0
         self.count = int(np.count_nonzero(looked_at))
         places = looked_at & (block_means(known) > _KNOWN)
-        places[places] = _may_tell(blocks_at(texture.down, places))
+        down = blocks_at(texture.down, places)
+        varies = np.einsum("ij,ij->i", down, down) / BLOCK**2 - np.square(down.mean(axis=1))
+        # of a block's squares no more is left than all of them, over a count of `_KNOWN` of it or more
+        places[places] = varies > np.float32(_LEAST * _KNOWN * _ROUNDING)
 
         self._left, self._seen = blocks_at(texture.left, places), blocks_at(known, places)
         self._across, self._down = blocks_at(texture.across, places), blocks_at(texture.down, places)
@@ -273,24 +279,6 @@ class _Blocks:
         self._u += moved[:, None]
 
 
-def _may_tell(down: Floats) -> NDArray[np.bool_]:
-    """Tell which blocks vary enough down the columns, whatever part of them has a disparity.
-
-    What is left of a block's squares is no more than all of them, over a count of `_KNOWN` of it or more.
-    """
-    varies = np.einsum("ij,ij->i", down, down) / BLOCK**2 - np.square(down.mean(axis=1))
-    enough: NDArray[np.bool_] = varies > np.float32(_LEAST * _KNOWN * _ROUNDING)
-    return enough
-
-
-def _smooth(view: View) -> Floats:
-    """Smooth a view by half a pixel, beside what is smoothed for grey levels between pixels.
-
-    More takes away the grain that tells on an empty road, less leaves the noise.
-    """
-    return smoothed(view)
-
-
 def _gradients(view: Floats) -> tuple[Floats, Floats]:
     """Grey levels per pixel along the rows and down the columns."""
     across, down = (
@@ -298,11 +286,6 @@ def _gradients(view: Floats) -> tuple[Floats, Floats]:
         for order in ((1, 0), (0, 1))
     )
     return across, down
-
-
-def _is_plainly_level(found: Misalignment, fit: RowFit, shape: tuple[int, ...]) -> bool:
-    """Tell whether views would be level even if most of how they lie were still hidden."""
-    return is_level(found.times(_HIDDEN), fit.errors, shape)
 
 
 class Tolerance(NamedTuple):

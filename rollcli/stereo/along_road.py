@@ -7,6 +7,7 @@ a few disparities are enough. What lies further off the plane is known from the 
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -14,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.stereo.alignment import level
+from rollcli.stereo.alignment import level, seen_from_right
 from rollcli.stereo.misalignment import Misalignment
 from rollcli.stereo.options import StereoOptions
 from rollcli.stereo.sgbm import (
@@ -77,34 +78,50 @@ class Search(NamedTuple):
     options: StereoOptions
 
 
+@dataclass(frozen=True, eq=False)
 class Levelled:
     """A pair whose right view is levelled when it is resampled: whole, smaller, or along a plane.
 
     Each match is made once, when it is first asked for.
+
+    Attributes
+    ----------
+    views : pair of ndarray of uint8, shape (H, W)
+        As they were given.
+    lies : Misalignment
+        How the right one lies.
+    seen : ndarray of float32 or None
+        A map of the pair at any size, in its own pixels: a tilt moves near points further.
+    search : Search
+    find_road : callable or None
     """
 
-    def __init__(
-        self,
-        views: Views,
-        lies: Misalignment,
-        near: Callable[[], Map | None],
-        search: Search,
-        find_road: FindRoad | None,
-    ) -> None:
-        """Take views as given, how the right one lies, how to get its disparities, and what is looked for."""
-        self.shape, self.search, self._find_road = views[0].shape, search, find_road
-        self._views, self._lies, self._near = views, lies, near if lies.tilt else lambda: None
+    views: Views
+    lies: Misalignment
+    seen: Map | None
+    search: Search
+    find_road: FindRoad | None
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width."""
+        return self.views[0].shape
+
+    @cached_property
+    def _near(self) -> Map | None:
+        """The right view's disparities; None where they are not known, or not needed."""
+        return seen_from_right(self.seen) if self.seen is not None and self.lies.tilt else None
 
     @cached_property
     def whole(self) -> Views:
         """Both views at their size."""
-        return self._views[0], level(self._views[1], self._lies, self._near())
+        return self.views[0], level(self.views[1], self.lies, self._near)
 
     @cached_property
     def _small(self) -> Map | None:
         """The map at a third of the size; None where it would be too narrow."""
-        left, right = shrink_both(self._views, _SMALLER)
-        views = left, level(right, self._lies.resized(1 / _SMALLER), self._near())
+        left, right = shrink_both(self.views, _SMALLER)
+        views = left, level(right, self.lies.resized(1 / _SMALLER), self._near)
         first, options = self.search.first // _SMALLER, self.search.options
         width = -(-self.search.width // _SMALLER)
         count = usable_range(width, first, left.shape[1], options.block_size)
@@ -115,15 +132,20 @@ class Levelled:
     @cached_property
     def plane(self) -> Plane | None:
         """The road's; None where there is none, or nothing finds it."""
-        if self._find_road is None or self.search.first < 0 or self._small is None:
+        if self.find_road is None or self.search.first < 0 or self._small is None:
             return None
-        found = self._find_road(self._small)
+        found = self.find_road(self._small)
         return None if found is None else _resized(found, self._small.shape, self.shape)
 
     @cached_property
     def top(self) -> int:
         """The first row that the plane reaches, and some to spare; the height where there is no plane."""
-        return self.shape[0] if self.plane is None else _first_row(self.plane, self.shape)
+        if self.plane is None:
+            return self.shape[0]
+        at_origin, across, down = self.plane
+        height, width = self.shape
+        horizon = -(at_origin + max(0.0, across * (width - 1))) / down  # at the side where that is higher
+        return int(max(0.0, min(horizon - _SPARE, _MOST_ABOVE * height)))
 
     @cached_property
     def coarse(self) -> Map:
@@ -143,10 +165,10 @@ class Levelled:
         `plane` has the disparities of these rows, px. Grey levels between pixels are those of a view twice as
         large, see `views.smoothed_between`; the left view is as smooth.
         """
-        left, right = self._views
+        left, right = self.views
         u = np.arange(self.shape[1], dtype=np.float32) + np.float32(middle) - plane
         v = np.arange(self.shape[0], dtype=np.float32)[rows, None]
-        u, v = seen_at(self._lies, u, v, self.shape, plane)
+        u, v = seen_at(self.lies, u, v, self.shape, plane)
         return smoothed_at_pixels(left[rows]), grey_along(right, u, np.broadcast_to(v, u.shape))
 
 
@@ -168,13 +190,14 @@ def match_for_road(pair: Levelled, *, whole: bool = False) -> Map:
     if whole or pair.plane is None:
         disparity = without_lag(match_views(pair.whole, first, count, options), options.mode)
         if (near := pair.road) is not None:
-            np.copyto(disparity[pair.top :], near.disparity, where=near.found & near.lies_on)
+            np.copyto(disparity[pair.top :], near.disparity, where=near.lies_on & (near.disparity > 0))
         return disparity
     disparity = pair.coarse.copy()
-    if pair.road is None:
-        disparity[pair.top :] = match_below(pair.whole, first, count, options, pair.top)
+    rows = disparity[pair.top :]
+    if (near := pair.road) is None:
+        rows[:] = match_below(pair.whole, first, count, options, pair.top)
         return without_lag(disparity, options.mode)
-    disparity[pair.top :] = pair.road.beside(pair.coarse[pair.top :])
+    np.copyto(rows, near.disparity, where=near.lies_on | (rows <= 0))
     return disparity
 
 
@@ -186,33 +209,19 @@ def _resized(plane: Plane, shape: tuple[int, ...], to: tuple[int, ...]) -> Plane
     return at_origin + a * (1 - across) / 2 + b * (1 - down) / 2, a, b
 
 
-def _first_row(plane: Plane, shape: tuple[int, ...]) -> int:
-    """Return the first row that the plane reaches, at the side where that is higher, and some to spare."""
-    at_origin, across, down = plane
-    horizon = -(at_origin + max(0.0, across * (shape[1] - 1))) / down
-    return int(max(0.0, min(horizon - _SPARE, _MOST_ABOVE * shape[0])))
-
-
 class _Near(NamedTuple):
     """Rows that were matched along a plane; arrays of their shape.
 
     Attributes
     ----------
     disparity : ndarray of float32
-        Pixels.
-    found : ndarray of bool
-        Where there is one.
+        Pixels; 0 where none is found.
     lies_on : ndarray of bool
         Where the small map is near the plane.
     """
 
     disparity: Map
-    found: NDArray[np.bool_]
     lies_on: NDArray[np.bool_]
-
-    def beside(self, coarse: Map) -> Map:
-        """Return these rows, off the plane with the disparities of the small map."""
-        return np.where(self.lies_on | (coarse <= 0), self.disparity * self.found, coarse)
 
 
 def _match_along(pair: Levelled, plane: Plane, coarse: Map) -> _Near | None:
@@ -241,7 +250,7 @@ def _match_along(pair: Levelled, plane: Plane, coarse: Map) -> _Near | None:
     found = np.count_nonzero(lies_on & known & (np.abs(seen - disparity) < np.float32(_AS_FAR)))
     if on < max(1, _FEWEST_ON * np.count_nonzero(seen)) or found < _FEWEST_FOUND * on:
         return None
-    return _Near(disparity, known, lies_on)
+    return _Near(disparity * known, lies_on)
 
 
 def _match_blocks(views: Views, count: int) -> NDArray[np.int16]:

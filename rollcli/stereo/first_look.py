@@ -1,9 +1,8 @@
 """A first look at a pair, on small views: how far to search, and how the right view lies."""
 
 import math
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +22,6 @@ from rollcli.stereo.misalignment import LEVEL, Misalignment
 from rollcli.stereo.options import StereoOptions
 from rollcli.stereo.sgbm import NARROWEST, match_views, usable_range
 from rollcli.stereo.views import Views, shrink_both
-
-Matcher = Callable[[float], NDArray[np.float32]]
-"""The disparity map, in pixels with 0 for no data, of a search as wide as given, pixels."""
 
 _RANGE_ROUNDS = 4
 # How far beyond the largest disparity is searched, times it; and the share of this that it has to lie within
@@ -50,55 +46,6 @@ class SmallMatch:
     top: float
     disparity: NDArray[np.float32]
     measured: Measured | None = None
-
-
-def largest_disparity(match: Matcher, width: int, start: float | None = None) -> SmallMatch | None:
-    """Find the largest disparity of a pair, and a map of what may be believed.
-
-    Parameters
-    ----------
-    match : callable
-        Matches the pair within a range.
-    width : int
-        Of the images, pixels.
-    start : float, optional
-        About how large it is; None: find that, too.
-
-    Returns
-    -------
-    SmallMatch or None
-        None where nothing can be matched.
-
-    Notes
-    -----
-    A search over half the width finds any disparity that a pair can have, but leaves out the left half of
-    the image. What it finds starts a narrower one, which grows for as long as it meets its end. Where there
-    is nothing to match, any candidate wins, and with more of them another one: so only what a search twice as
-    wide finds too is believed.
-    """
-    top = rough_largest(match, width) if start is None else start
-    found = None
-    for _ in range(_RANGE_ROUNDS):
-        if top is None:
-            return None
-        searched = _BEYOND * top + 4
-        narrow, wide = match(searched), match(min(2 * searched, width / 2))
-        believed = np.where(np.abs(narrow - wide) < 1, narrow, np.float32(0))
-        top = _top(believed, 99)
-        found = None if top is None else SmallMatch(top, np.where(wide > 0, believed, narrow))
-        if top is not None and top < _WITHIN * searched:
-            break
-    return found
-
-
-def rough_largest(match: Matcher, width: int) -> float | None:
-    """Find about how large disparities get, by one search over half the width; None where none is found."""
-    return _top(match(width / 2), 98)
-
-
-def _top(disparity: NDArray[Any], percentile: float) -> float | None:
-    valid = disparity[disparity > 0]
-    return float(np.percentile(valid, percentile)) if valid.size > _MIN_SHARE * disparity.size else None
 
 
 _PIXELS = 16_000  # of the views that are looked at
@@ -148,19 +95,6 @@ class FirstLook:
     disparity: NDArray[np.float32] | None = None
 
 
-class _Pair(NamedTuple):
-    """Small views, and what is compared of them."""
-
-    views: Views
-    texture: Texture
-
-    @staticmethod
-    def of(views: Views, factor: float) -> "_Pair":
-        """Shrink the views by `factor`."""
-        small = shrink_both(views, factor)
-        return _Pair(small, Texture.of(small))
-
-
 def look_for_range(views: Views) -> FirstLook:
     """Find the range of a pair alone: how its right view lies is not measured."""
     factor = size_factor(views[0].shape, _PIXELS)
@@ -170,30 +104,26 @@ def look_for_range(views: Views) -> FirstLook:
 def first_look(small: SmallViews) -> FirstLook:
     """Find the range of a pair, and how its right view lies, coarse to fine."""
     factor = size_factor(small.shape, _PIXELS)
-    pair = _Pair.of(small.whole, factor)
-    first = _look(pair, LEVEL)
-    plain = _plainly_level(first, factor, small.shape)
-    if plain is not None:
-        return plain
-    first = _climb(pair, LEVEL, first)
+    views = shrink_both(small.whole, factor)
+    texture = Texture.of(views)
+    first = _look(views, texture, LEVEL)
+    seen = None if first is None or first.measured is None else first.measured.resized(factor)
+    telling = seen is not None and seen.errors.offset <= _TELLING_ERROR
+    if seen and telling and is_level(seen.misalignment, seen.errors, small.shape, _AS_GOOD_AS_LEVEL):
+        return _seen(first, factor, replace(seen, misalignment=LEVEL))  # as far as small views tell
+    first = _climb(views, texture, LEVEL, first)
     look, sure = _closer(small, first, factor)
     if sure:
         return look
     starts = (Misalignment(offset / factor) for offset in _STARTS)
-    clearest = _clearest([first, *(_climb(pair, start) for start in starts)])
+    attempts = [first, *(_climb(views, texture, start) for start in starts)]
+    # the attempt that leaves the least unexplained, of those that tell anything
+    clearest = min(
+        filter(None, attempts),
+        key=lambda each: each.measured.spread if each.measured else math.inf,
+        default=None,
+    )
     return look if clearest is first else _closer(small, clearest, factor)[0]
-
-
-def _plainly_level(found: SmallMatch | None, factor: float, shape: tuple[int, ...]) -> FirstLook | None:
-    """Return what was found where small views say level, as far as they tell; the match decides."""
-    if found is None or found.measured is None:
-        return None
-    seen = found.measured.resized(factor)
-    if seen.errors.offset > _TELLING_ERROR or not is_level(
-        seen.misalignment, seen.errors, shape, _AS_GOOD_AS_LEVEL
-    ):
-        return None
-    return _seen(found, factor, replace(seen, misalignment=LEVEL))
 
 
 def _closer(small: SmallViews, found: SmallMatch | None, factor: float) -> tuple[FirstLook, bool]:
@@ -214,23 +144,16 @@ def _is_sure(coarse: Measured, measured: Measured | None, shape: tuple[int, ...]
     return measured.errors.offset < _UNSURE_ERROR and step < _UNSURE_STEP
 
 
-def _clearest(attempts: Iterable[SmallMatch | None]) -> SmallMatch | None:
-    """Return the attempt that leaves the least unexplained, of those that tell anything."""
-    some = [each for each in attempts if each is not None]
-    return min(some, key=lambda each: each.measured.spread if each.measured else math.inf, default=None)
-
-
-def _climb(pair: _Pair, start: Misalignment, first: SmallMatch | None = None) -> SmallMatch | None:
+def _climb(
+    views: Views, texture: Texture, start: Misalignment, first: SmallMatch | None = None
+) -> SmallMatch | None:
     """Level, match and measure in turn, until the right view lies still; `first` is what `start` gave."""
-    shape = pair.views[0].shape
+    shape = views[0].shape
     found, at, approach = None, start, Approach(shape)
     for _ in range(_ROUNDS):
-        seen, first = first or _look(pair, at, found), None
-        if seen is None:
-            return found
-        found = seen
-        if found.measured is None:
-            return found
+        before, found, first = found, first or _look(views, texture, at, found), None
+        if found is None or found.measured is None:
+            return found or before
         step = (found.measured.misalignment - at).reach(*shape)
         if step < _STEP:
             return found
@@ -238,42 +161,72 @@ def _climb(pair: _Pair, start: Misalignment, first: SmallMatch | None = None) ->
     return found
 
 
-def _look(pair: _Pair, at: Misalignment, before: SmallMatch | None = None) -> SmallMatch | None:
+def _look(
+    views: Views, texture: Texture, at: Misalignment, before: SmallMatch | None = None
+) -> SmallMatch | None:
     """Level, match and measure once; `before` knows how far to search."""
-    left, right = pair.views
-    levelled = left, level(right, at)
+    levelled = views[0], level(views[1], at)
     matched = None if before is None else _match_again(levelled, before.top)
     if matched is None:
         matched = _match_small(levelled)
     if matched is None:
         return None
-    measured = measure_misalignment(pair.texture, matched.disparity, at)
-    return replace(matched, measured=measured)
+    return replace(matched, measured=measure_misalignment(texture, matched.disparity, at))
 
 
-def _match_again(pair: Views, top: float) -> SmallMatch | None:
+def _match_again(views: Views, top: float) -> SmallMatch | None:
     """Match over the range that was enough before the views lay otherwise; None where it is not now."""
     searched = _BEYOND * top + 4
-    disparity = _match(pair, searched)
+    disparity = _match(views, searched)
     found = _top(disparity, 99)
     return None if found is None or found > _WITHIN * searched else SmallMatch(found, disparity)
 
 
-def _match_small(pair: Views) -> SmallMatch | None:
-    """Match over the range that is found to be enough."""
-    half = shrink_both(pair, 2)
-    rough = rough_largest(lambda count: _match(half, count), half[0].shape[1])
-    width = pair[0].shape[1]
+def _match_small(views: Views) -> SmallMatch | None:
+    """Match over the range that is found to be enough; None where nothing can be matched.
 
-    def match(count: float) -> NDArray[np.float32]:
-        return _match(pair, count)
-
-    found = None
+    A search over half the width finds any disparity that a pair can have, but leaves out the left half of
+    the image. What it finds starts a narrower one.
+    """
+    half = shrink_both(views, 2)
+    rough, found = _rough(half), None
     if rough is not None and rough < _NEAR * half[0].shape[1]:
-        found = largest_disparity(match, width, 2 * rough)
+        found = _match_up_to(views, 2 * rough)
     if found is None:  # a near scene, or grain that is gone at half the size
-        found = largest_disparity(match, width)
+        found = _match_up_to(views, _rough(views))
     return found
+
+
+def _rough(views: Views) -> float | None:
+    """Find about how large disparities get, by one search over half the width; None where none is found."""
+    return _top(_match(views, views[0].shape[1] / 2), 98)
+
+
+def _match_up_to(views: Views, top: float | None) -> SmallMatch | None:
+    """Match over a range that grows for as long as disparities of about `top` and more meet its end.
+
+    Where there is nothing to match, any candidate wins, and with more of them another one: so only what a
+    search twice as wide finds too is believed.
+    """
+    found = None
+    for _ in range(_RANGE_ROUNDS):
+        if top is None:
+            return None
+        searched = _BEYOND * top + 4
+        narrow, wide = (
+            _match(views, count) for count in (searched, min(2 * searched, views[0].shape[1] / 2))
+        )
+        believed = np.where(np.abs(narrow - wide) < 1, narrow, np.float32(0))
+        top = _top(believed, 99)
+        found = None if top is None else SmallMatch(top, np.where(wide > 0, believed, narrow))
+        if top is not None and top < _WITHIN * searched:
+            break
+    return found
+
+
+def _top(disparity: NDArray[Any], percentile: float) -> float | None:
+    valid = disparity[disparity > 0]
+    return float(np.percentile(valid, percentile)) if valid.size > _MIN_SHARE * disparity.size else None
 
 
 def _seen(found: SmallMatch | None, factor: float, measured: Measured | None) -> FirstLook:

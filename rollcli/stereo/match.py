@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -20,7 +20,6 @@ from rollcli.stereo.alignment import (
     Tolerance,
     is_level,
     level,
-    seen_from_right,
     textured_share,
 )
 from rollcli.stereo.along_road import FindRoad, Levelled, Plane, Search, match_for_road
@@ -32,7 +31,7 @@ from rollcli.stereo.misalignment_words import NOT_LEVELLED, NOT_TOLD_BY_ROWS, TO
 from rollcli.stereo.options import StereoOptions as StereoOptions
 from rollcli.stereo.refinement import refined
 from rollcli.stereo.sgbm import NARROWEST, usable_range
-from rollcli.stereo.views import Map, Views, prepare_views, shrink
+from rollcli.stereo.views import Map, prepare_views, shrink
 
 # Shares of the textured blocks that tell
 _SURE = 0.3  # from here on the images are what they should be
@@ -258,8 +257,11 @@ def match_pair(
     width, first = views[0].shape[1], options.min_disparity
     if usable_range(1, first, width, options.block_size) < NARROWEST:
         raise InputError(f"images {width} px wide are too narrow to match from disparity {first} on")
-    small = SmallViews(views, given) if options.measures_alignment else None
-    look = _look_as_given(views, options) if small is None else first_look(small)
+    told, small, look = options.given_alignment(width), SmallViews(views, given), FirstLook(None, None)
+    if options.measures_alignment:
+        look = first_look(small)
+    elif options.num_disparities is None:
+        look = look_for_range((views[0], level(views[1], told.lies)))
     count = options.num_disparities
     if count is None:
         count = (width // 8 if look.range is None else look.range) - first
@@ -268,30 +270,27 @@ def match_pair(
     search = Search(first, count, options)
 
     @lru_cache(maxsize=1)
-    def near() -> Map | None:
-        return None if look.disparity is None else seen_from_right(look.disparity)
-
-    @lru_cache(maxsize=1)
     def levelled(lies: Misalignment) -> Levelled:
-        return Levelled(views, lies, near, search, wanted.road)
+        return Levelled(views, lies, look.disparity, search, wanted.road)
 
     def match(lies: Misalignment) -> Map:
         return match_for_road(levelled(lies))
 
     support, doubt = None, ""
-    if small is None:
-        told = options.given_alignment(width)
+    if options.measures_alignment:
+        matched, corrected, measured, doubt = _match_levelled(match, small, look, first < 0)
+    else:
         corrected, measured, support = told.lies, None, told.columns
         matched = match(corrected)
         if options.checks_alignment:
-            measured = SmallViews(views, given).measure(matched, corrected)
-        if measured is not None and _agrees(measured, corrected, views[0].shape):
-            found = told.of_pair(measured.misalignment.offset, measured.errors.offset)
-            corrected = found.rounded(*views[0].shape)
-        elif measured is not None:
-            doubt = CONTRADICTS
-    else:
-        matched, corrected, measured, doubt = _match_levelled(match, small, look, first < 0)
+            measured = small.measure(matched, corrected)
+        if measured is not None:
+            lies, errors = measured.misalignment, measured.errors
+            # but for what refinement takes away
+            if is_level(lies - corrected, errors, views[0].shape, _KEPT._replace(sure=4.0)):
+                corrected = told.of_pair(lies.offset, errors.offset).rounded(*views[0].shape)
+            else:
+                doubt = CONTRADICTS
     if corrected == LEVEL:
         support = NOTHING_KNOWN
     elif support is None:
@@ -319,24 +318,14 @@ def match_pair(
     )
 
 
-def _agrees(measured: Measured, corrected: Misalignment, shape: tuple[int, ...]) -> bool:
-    """Tell whether views that were levelled as a file says are level, but for what refinement takes away."""
-    return is_level(measured.misalignment - corrected, measured.errors, shape, _KEPT._replace(sure=4.0))
-
-
-def _look_as_given(views: Views, options: StereoOptions) -> FirstLook:
-    """Look at views that lie as the user says, where their range is not given."""
-    if options.num_disparities is not None:
-        return FirstLook(None, None)
-    return look_for_range((views[0], level(views[1], options.given_alignment(views[0].shape[1]).lies)))
-
-
 def _match_levelled(
     match: Callable[[Misalignment], Map], small: SmallViews, look: FirstLook, any_scene: bool
 ) -> tuple[Map, Misalignment, Measured | None, str]:
     """Match once the views are level; the map, what was corrected and measured, and why it may be wrong."""
-    looked_at = _worth_correcting(look.measured, small.shape)
-    wanted, approach = looked_at, Approach(small.shape)
+    seen, shape, looked_at = look.measured, small.shape, LEVEL
+    if seen is not None and not is_level(seen.misalignment, seen.errors, shape):
+        looked_at = seen.misalignment
+    wanted, approach = looked_at, Approach(shape)
     for matched in range(_MATCHES):
         at = wanted
         disparity = match(at)
@@ -345,43 +334,26 @@ def _match_levelled(
             check_same_scene(small, look, measured)
         if measured is None:
             return disparity, at, look.measured, TOO_LITTLE
-        wanted = _wanted(measured, approach.next(at, measured.misalignment), small.shape)
+        # where this measurement and that before it lead to; level if either is
+        lies, errors = measured.misalignment, measured.errors
+        wanted = approach.next(at, lies)
+        if is_level(lies, errors, shape) or is_level(wanted, errors, shape):
+            wanted = LEVEL
         if wanted == at:
-            return disparity, at, measured, _doubt(at, measured)
-        if wanted != LEVEL and _is_kept(measured, at, small.shape):
-            return disparity, measured.misalignment, measured, _doubt(measured.misalignment, measured)
+            return disparity, at, measured, _doubt(at, errors)
+        left = (lies - at).times(measured.spread / _KEPT_SPREAD)
+        if wanted != LEVEL and is_level(left, errors, shape, _KEPT):  # refinement does the rest
+            return disparity, lies, measured, _doubt(lies, errors)
         if matched == 1 and looked_at != LEVEL:  # which may have led astray
-            wanted, approach = LEVEL, Approach(small.shape)
+            wanted, approach = LEVEL, Approach(shape)
     return disparity, at, measured, NOT_LEVELLED
 
 
-def _wanted(measured: Measured, reached: Misalignment, shape: tuple[int, ...]) -> Misalignment:
-    """Return where to match next: where this measurement and that before it lead to; level if either is."""
-    either = (
-        _worth_correcting(replace(measured, misalignment=each), shape)
-        for each in (measured.misalignment, reached)
-    )
-    return LEVEL if LEVEL in either else reached
-
-
-def _is_kept(measured: Measured, at: Misalignment, shape: tuple[int, ...]) -> bool:
-    """Tell whether a map that was matched at `at` is so nearly right that refinement does the rest."""
-    left = (measured.misalignment - at).times(measured.spread / _KEPT_SPREAD)
-    return is_level(left, measured.errors, shape, _KEPT)
-
-
-def _worth_correcting(measured: Measured | None, shape: tuple[int, ...]) -> Misalignment:
-    if measured is None or is_level(measured.misalignment, measured.errors, shape):
-        return LEVEL
-    return measured.misalignment
-
-
-def _doubt(corrected: Misalignment, left: Measured | None) -> str:
+def _doubt(corrected: Misalignment, errors: Misalignment) -> str:
     far = (
         abs(corrected.offset) > _FURTHEST.offset
         or abs(corrected.rotation) > _FURTHEST.rotation
         or abs(corrected.scale) > _FURTHEST.scale
     )
-    unusual = abs(corrected.scale) > _UNUSUAL_SCALE
-    far |= unusual and left is not None and left.errors.offset > _UNUSUAL_ERROR
+    far |= abs(corrected.scale) > _UNUSUAL_SCALE and errors.offset > _UNUSUAL_ERROR
     return "the views lie too far from level to be sure of the correction" if far else ""

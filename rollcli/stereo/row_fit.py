@@ -304,23 +304,14 @@ def column_support(seen: ColumnEvidence) -> ColumnSupport:
         seen.offset / np.square(np.array(BELIEF.focal) * width),
     )
     yaw, skew = np.square(np.array([BELIEF.yaw, BELIEF.skew]) / (_FOCAL * width))
-    twist, twist_error = _yaw_of_twist(
-        seen.twist,
-        lens / (x * y) ** 2 + seen.twist_variance,
-        yaw,
-        skew,
-        _lens_ratio(seen.shapes, seen.shape_variances),
-    )
+    # how many times likelier the shapes are those of a lens than none; a yaw makes none
+    curved, even = (seen.shape_variances + each**2 for each in (BELIEF.lens_shape, BELIEF.no_shape))
+    better = np.exp((np.square(seen.shapes) * (1 / even - 1 / curved)).sum() / 2)
+    ratio = float(np.sqrt(np.prod(even / curved)) * better)
+    error = lens / (x * y) ** 2 + seen.twist_variance
+    twist, twist_error = _yaw_of_twist(seen.twist, error, yaw, skew, ratio)
     parts = scale[1], 2 * twist_error * height * _ROAD_ACROSS, pitch[1] * height * _ROAD_DOWN
     return ColumnSupport(scale[0], twist, pitch[0], float(np.linalg.norm(parts))).resized(seen.factor)
-
-
-def _lens_ratio(shapes: Doubles, variances: Doubles) -> float:
-    """Return how many times likelier shapes of a lens are than none, px and px^2; a yaw makes none."""
-    lens, even = (variances + each**2 for each in (BELIEF.lens_shape, BELIEF.no_shape))
-    return float(
-        np.sqrt(np.prod(even / lens)) * np.exp((np.square(shapes) * (1 / even - 1 / lens)).sum() / 2)
-    )
 
 
 def _yaw_of_twist(twist: float, error: float, yaw: float, skew: float, ratio: float) -> tuple[float, float]:
@@ -484,20 +475,15 @@ def _settled(
     return fit._replace(spread=spread)
 
 
-def _covariance(design: Doubles, fit: _Fit, tile: NDArray[np.intp]) -> Doubles:
-    """Return the covariance of the values of a fit whose blocks err together within a tile."""
-    scores = np.stack([np.bincount(tile, each) for each in design * (fit.weight * fit.off)])
-    spread = fit.inverse @ scores
-    return spread @ spread.T
-
-
 def _variance(design: Doubles, fit: _Fit, tile: NDArray[np.intp]) -> float:
     """Return what the inverse of the normal equations is multiplied by to be a covariance of values.
 
     From well determined values: where two columns are nearly one, sums over tiles do not see the doubt.
     """
     normal = (design * fit.weight) @ design.T
-    found = BELIEF.tiles**2 * float(np.trace(normal @ _covariance(design, fit, tile))) / len(design)
+    scores = np.stack([np.bincount(tile, each) for each in design * (fit.weight * fit.off)])
+    spread = fit.inverse @ scores  # blocks err together within a tile
+    found = BELIEF.tiles**2 * float(np.trace(normal @ (spread @ spread.T))) / len(design)
     return max(found, _EXACT)
 
 

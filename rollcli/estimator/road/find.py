@@ -155,7 +155,8 @@ class Judge:
     def __init__(self, sample: Sample, tuning: SearchTuning) -> None:
         x, y, d, tolerance = (each[sample.few] for each in (sample.x, sample.y, sample.d, sample.tolerance))
         across, along = sample.slopes
-        self._tuning, self._slope_noise, self.pixels = tuning, sample.slope_noise, len(d)
+        self._tuning, self.pixels = tuning, len(d)
+        self._slope_noise = sample.noise * sample.grid.scale / sample.reach  # px per unit
         self._rows = np.stack([np.ones_like(d), x, y, d]) / tolerance
         self._near = np.minimum(d, quantile(d, 0.5))  # what is near ahead is the road driven on
         self._products = (self._rows[:3, None] * self._rows[None]).reshape(12, -1) * self._near

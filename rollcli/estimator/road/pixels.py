@@ -1,6 +1,5 @@
 """Which pixels an angle rests on: the road, a part of it, or every valid pixel."""
 
-import math
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -78,46 +77,36 @@ class PixelSet:
 def select_pixels(checked: CheckedMap, request: Request) -> PixelSet:
     """Find the road if that is asked for, and sum the pixels that the method works on.
 
+    Without a road these are all valid ones, as in the paper; a sample of them serves the interval.
+
     Raises
     ------
     EstimationError
         When there is no road, or its pixels do not determine an angle.
     """
-    found = _find(checked, request) if request.road == "auto" else None
+    tuning, values, usable = request.tuning, checked.values, checked.usable
+    road, surface = None, None
+    if request.road == "auto":
+        sample = take_sample(values, usable, tuning.sample)
+        road = find_road(sample, request.max_roll, request.seed, tuning)
+        surface = fit_surface(sample, road, parabolic=request.parabolic, tuning=tuning)
     if request.method in AREAS:
-        return _area_pixels(checked, found, request)
-    return _all_pixels(checked, request) if found is None else _road_pixels(*found)
-
-
-def _find(checked: CheckedMap, request: Request) -> tuple[Road, Surface]:
-    tuning = request.tuning
-    sample = take_sample(checked.values, checked.usable, tuning.sample)
-    road = find_road(sample, request.max_roll, request.seed, tuning)
-    return road, fit_surface(sample, road, parabolic=request.parabolic, tuning=tuning)
-
-
-def _road_pixels(road: Road, surface: Surface) -> PixelSet:
-    """Sum the road's pixels by their weights."""
-    moments = point_moments(surface.x, surface.y, surface.d, surface.weights, surface.grid)
-    energy = Energy.of(moments, float(surface.d.max()), parabolic=surface.parabolic)
-    return PixelSet(energy, surface, road, surface.share)
-
-
-def _all_pixels(checked: CheckedMap, request: Request) -> PixelSet:
-    """Sum every valid pixel, as the paper does; a sample of them serves the interval."""
-    values, usable = checked.values, checked.usable
+        return _area_pixels(checked, road, surface, request)
+    if surface is not None:
+        moments = point_moments(surface.x, surface.y, surface.d, surface.weights, surface.grid)
+        energy = Energy.of(moments, float(surface.d.max()), parabolic=surface.parabolic)
+        return PixelSet(energy, surface, road, surface.share)
     used = values if usable is None else np.where(usable, values, 0)
-    peak = float(used.max())
-    if not math.isfinite(peak):
-        peak = float(used[np.isfinite(used)].max())
+    peak = float(np.fmax.reduce(used, axis=None))  # where one is NaN the other is taken
     energy = Energy.of(map_moments(used), peak, parabolic=request.parabolic)
-    return PixelSet(energy, _sampled_surface(values, usable, energy, request.tuning.sample), None, 1.0)
+    return PixelSet(energy, _sampled_surface(values, usable, energy, tuning.sample), None, 1.0)
 
 
-def _area_pixels(checked: CheckedMap, found: tuple[Road, Surface] | None, request: Request) -> PixelSet:
+def _area_pixels(
+    checked: CheckedMap, road: Road | None, surface: Surface | None, request: Request
+) -> PixelSet:
     """Let the method choose among the road's pixels, or the valid ones; a mask is the chosen area."""
     values = checked.values
-    road, surface = found or (None, None)
     candidates = checked.valid if surface is None else checked.valid & surface.covers(values, request.tuning)
     settings = AreaSettings(request.max_roll, chosen=checked.usable is not None)
     pixels = load_area_method(request.method)(values, candidates, settings)

@@ -104,11 +104,6 @@ class Sample:
     reach: int
     spacing: Spacing
 
-    @property
-    def slope_noise(self) -> float:
-        """What the noise makes of a slope, px per unit."""
-        return self.noise * self.grid.scale / self.reach
-
 
 def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None, tuning: SampleTuning) -> Sample:
     """Sample a map.
@@ -140,7 +135,8 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None, tunin
     d = values_at(places, disparity)
     few = every(len(d), tuning.coarse_pixels)
     few_d = d[few].copy()
-    steps = steps_to(places[few] + sides(reach, width), disparity, few_d)
+    sides = np.array([[-reach], [reach], [-reach * width], [reach * width]])  # left, right, up and down
+    steps = steps_to(places[few] + sides, disparity, few_d)
     jumps, typical = np.abs(steps), quantile(few_d, 0.5)
     if not _SMALLEST < typical < _LARGEST:
         raise EstimationError(f"disparities of about {typical:g}: they have to be in pixels, or nearly so")
@@ -201,14 +197,14 @@ def _lattice(
     height: int, width: int, reach: int, spacing: Spacing
 ) -> tuple[NDArray[np.intp], Singles, Singles, NDArray[np.uint16]]:
     """Return the places in the map, x, y and the column in the lattice of all pixels so far apart."""
-    grid, (top, left) = Grid.of_shape(height, width), spacing.first(reach)
+    top, left = spacing.first(reach)
     v, u = np.arange(top, height - reach, spacing.rows), np.arange(left, width - reach, spacing.columns)
-    x, y = ((u - grid.centre_u) / grid.scale).astype(np.float32), (v - grid.centre_v) / grid.scale
+    x, y = (each.astype(np.float32) for each in Grid.of_shape(height, width).normalised(u, v))
     shape = (len(v), len(u))
     return (
         (v[:, None] * width + u).ravel(),
         np.broadcast_to(x, shape).ravel(),
-        np.broadcast_to(y.astype(np.float32)[:, None], shape).ravel(),
+        np.broadcast_to(y[:, None], shape).ravel(),
         np.broadcast_to(np.arange(len(u), dtype=np.uint16), shape).ravel(),
     )
 
@@ -256,11 +252,6 @@ def values_at(places: NDArray[np.intp], disparity: NDArray[Any]) -> Singles:
     with np.errstate(over="ignore", invalid="ignore"):
         values: Singles = disparity.reshape(-1).take(places, mode="clip").astype(np.float32, copy=False)
     return values
-
-
-def sides(reach: int, width: int) -> NDArray[np.intp]:
-    """Return how far the neighbours of a pixel are, counted row by row: left, right, up and down, (4, 1)."""
-    return np.array([[-reach], [reach], [-reach * width], [reach * width]])
 
 
 def steps_to(there: NDArray[np.intp], disparity: NDArray[Any], d: Singles) -> Singles:

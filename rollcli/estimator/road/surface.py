@@ -10,7 +10,7 @@ so that a kerb that is a little lower, or half a bin farther away, turns the ang
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,8 +106,7 @@ class Surface:
     def _covers(self, disparity: NDArray[Any], first: int, reach: int, tuning: Tuning) -> NDArray[np.bool_]:
         """Return the same of some rows, from `first` on: they are compared with those `reach` away."""
         rows, columns = (np.arange(side, dtype=np.float64) for side in disparity.shape)
-        x: Floats = (columns - self.grid.centre_u) / self.grid.scale
-        y: Floats = ((rows + first - self.grid.centre_v) / self.grid.scale)[:, None]
+        x, y = self.grid.normalised(columns, rows[:, None] + first)
         road = self.model.disparity(x, y)
         tolerance = tolerance_of(disparity, self.noise, tuning.sample)
         on_it: NDArray[np.bool_] = np.abs(road - disparity) < self.limit * tolerance
@@ -159,52 +158,29 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool, tuning: Tuning) 
     EstimationError
         When hardly any pixel lies on the road.
     """
-    near, stride = _near_pixels(sample, road, tuning)
-    lane = near.lane(road.model, parabolic=parabolic)
+    near = _near_pixels(sample, road, parabolic, tuning)
+    lane = near.lane(road.model)
     level, near = near.profiled(lane)
-    fit = near.fitted(lane, parabolic=parabolic)
-    used = (fit.weights > 0).nonzero()[0]
+    model, weights, bulge, camber_precision, limit = near.fitted(lane)
+    used = (weights > 0).nonzero()[0]
     if len(used) < _LEAST_PIXELS:
         raise EstimationError(HARDLY_A_PIXEL)
     x, y = near.places[:, used].astype(np.float64)
     return Surface(
         x,
         y,
-        (near.d - np.float32(fit.model.camber) * fit.bulge)[used].astype(np.float64),
-        fit.weights[used].astype(np.float64),
-        fit.model,
+        (near.d - np.float32(model.camber) * bulge)[used].astype(np.float64),
+        weights[used].astype(np.float64),
+        model,
         sample.grid,
         sample.noise,
         parabolic,
-        share=min(1.0, len(used) * stride / len(sample.d)),
-        moved=abs(fit.model.theta - road.model.theta),
+        share=min(1.0, len(used) * near.stride / len(sample.d)),
+        moved=abs(model.theta - road.model.theta),
         level=level,
-        camber_precision=fit.camber_precision,
-        limit=fit.limit,
+        camber_precision=camber_precision,
+        limit=limit,
     )
-
-
-class Fit(NamedTuple):
-    """A road, and how pixels lie around it; arrays of shape (N,).
-
-    Attributes
-    ----------
-    model : RoadModel
-    weights : ndarray
-        Those that it leaves the pixels.
-    bulge : ndarray
-        What a camber of 1 adds to the disparities, px.
-    camber_precision : float
-        What the prior adds to the normal equation of the camber.
-    limit : float
-        How far single pixels of the road are off it at most, tolerances.
-    """
-
-    model: RoadModel
-    weights: Singles
-    bulge: Singles
-    camber_precision: float
-    limit: float
 
 
 @dataclass(frozen=True)
@@ -225,8 +201,12 @@ class NearPixels:
         1 in the middle of the lane ahead, fading towards its sides.
     least_width : float
         Tolerances within which a pixel counts in any case.
+    stride : int
+        How many near pixels each of these stands for.
     independent_pixels : int
         As in `IntervalTuning`.
+    parabolic : bool
+        The road model: parabola or line.
     tuning : FitTuning
     """
 
@@ -237,10 +217,12 @@ class NearPixels:
     place: Singles
     ahead: Singles
     least_width: float
+    stride: int
     independent_pixels: int
+    parabolic: bool
     tuning: FitTuning
 
-    def lane(self, start: RoadModel, *, parabolic: bool) -> RoadModel:
+    def lane(self, start: RoadModel) -> RoadModel:
         """Fit the lane ahead, in one round: it only has to show the profile.
 
         Its middle, for there is no second round that leaves out a verge: with the square of `ahead` in place
@@ -250,7 +232,7 @@ class NearPixels:
         design[3] = 0
         squares = self._place_on(design, start)
         weights = self._weights(squares, self.tuning.start_width) * np.square(np.square(self.ahead))
-        return _moved(start, _products(design, weights, parabolic=parabolic))
+        return _moved(start, self._products(design, weights))
 
     def profiled(self, lane: RoadModel) -> tuple[Floats, "NearPixels"]:
         """Return how much of the lane's level the ground has in bins across, left to right, 0 to 1.
@@ -273,23 +255,25 @@ class NearPixels:
         fade = np.exp(-np.square(np.square(np.minimum(np.square(side / np.float32(tuning.profile)), 4))))
         weights = (_level_at(level, side, tuning) * fade).astype(np.float32)
         kept = (weights > 1e-3).nonzero()[0]  # others would only take time
-        d, alone, tolerance, ahead = (each[kept] for each in (self.d, self.alone, self.tolerance, self.ahead))
-        near = replace(
-            self,
-            places=self.places[:, kept],
-            d=d,
-            alone=alone,
-            tolerance=tolerance,
-            place=self.place[kept] * weights[kept],
-            ahead=ahead,
-        )
-        return level, near
+        others = {name: getattr(self, name)[kept] for name in ("d", "alone", "tolerance", "ahead")}
+        place = self.place[kept] * weights[kept]
+        return level, replace(self, places=self.places[:, kept], place=place, **others)
 
-    def fitted(self, start: RoadModel, *, parabolic: bool) -> Fit:
+    def fitted(self, start: RoadModel) -> tuple[RoadModel, Singles, Singles, float, float]:
         """Fit (a0, a1, a2, theta) and the camber, starting from the lane's.
 
         Gauss-Newton with Tukey's biweight, whose width shrinks from `start_width` as far as the spread of
         the pixels ahead allows. The camber has a prior: where the pixels do not determine it, it stays small.
+
+        Returns
+        -------
+        model : RoadModel
+        weights : ndarray of float32, shape (N,)
+            Those that it leaves the pixels.
+        bulge : ndarray of float32, shape (N,)
+            What a camber of 1 adds to the disparities, px.
+        camber_precision, limit : float
+            As in `Surface`.
         """
         tuning, limit, precision = self.tuning, self.tuning.start_width, math.inf
         model, design = start, np.ones((6, len(self.d)), np.float32)
@@ -299,7 +283,7 @@ class NearPixels:
         squares = self._place_on(design, model)
         weights = self._weights(squares, limit)
         for _ in range(_ROUNDS):
-            products = _products(design, weights, parabolic=parabolic)
+            products = self._products(design, weights)
             # the variance of the pixels over that of the prior, times how often they repeat each other
             total = products[0, 0]
             repeated = max(1.0, total / self.independent_pixels)
@@ -312,7 +296,7 @@ class NearPixels:
             weights = self._weights(squares, limit)
         alone = np.square((design[5] + self.alone - self.d) / self.tolerance)
         limit = min(tuning.start_width, self._width(alone, weights))
-        return Fit(model, weights, design[3], float(precision), limit)
+        return model, weights, design[3], float(precision), limit
 
     def _place_on(self, design: Singles, model: RoadModel) -> Singles:
         """Lay out a design for a road; return the squares of what is left of disparities, in tolerances.
@@ -333,6 +317,15 @@ class NearPixels:
         weights: Singles = np.square(np.maximum(1 - squares / np.float32(limit**2), 0)) * self.place
         return weights
 
+    def _products(self, design: Singles, weights: Singles) -> Floats:
+        """Return the normal equations of a design (6, N), right-hand side included: shape (6, 6)."""
+        if not self.parabolic:
+            design[2] = 0
+        products: Floats = (design * weights).dot(design.T).astype(np.float64)
+        if not products[0, 0] > 0:
+            raise EstimationError(HARDLY_A_PIXEL)
+        return products
+
     def _width(self, squares: Singles, weights: Singles) -> float:
         """Return how wide the weights should be, from the spread of the pixels ahead that have some.
 
@@ -343,8 +336,8 @@ class NearPixels:
         return max(self.least_width, self.tuning.width * math.sqrt(float(weights.dot(squares)) / total))
 
 
-def _near_pixels(sample: Sample, road: Road, tuning: Tuning) -> tuple[NearPixels, int]:
-    """Take the pixels near a road's plane; return how many near pixels each of them stands for, too."""
+def _near_pixels(sample: Sample, road: Road, parabolic: bool, tuning: Tuning) -> NearPixels:
+    """Take the pixels near a road's plane."""
     fit, model = tuning.fit, road.model
     c0, c1, c2 = road.plane.tolist()
     close = np.abs(c0 + c1 * sample.x + c2 * sample.y - sample.d) < _REACH * sample.tolerance
@@ -360,19 +353,18 @@ def _near_pixels(sample: Sample, road: Road, tuning: Tuning) -> tuple[NearPixels
     ahead = np.square(np.square(across * (model.alpha[1] / tuning.search.corridor) / mean))
     # the steps of a map of whole pixels are no spread: within less, only stripes of one value are left
     least = max(_LEAST_WIDTH, sample.quantum / quantile(sample.tolerance[sample.few], 0.5))
-    return (
-        NearPixels(
-            places=places,
-            d=mean,
-            alone=sample.d[near],
-            tolerance=sample.tolerance[near],
-            place=place,
-            ahead=np.exp(-np.minimum(ahead, MOST_FADED)) + np.float32(0.01),  # a lane may be hidden
-            least_width=least,
-            independent_pixels=tuning.interval.independent_pixels,
-            tuning=fit,
-        ),
-        stride,
+    return NearPixels(
+        places=places,
+        d=mean,
+        alone=sample.d[near],
+        tolerance=sample.tolerance[near],
+        place=place,
+        ahead=np.exp(-np.minimum(ahead, MOST_FADED)) + np.float32(0.01),  # a lane may be hidden
+        least_width=least,
+        stride=stride,
+        independent_pixels=tuning.interval.independent_pixels,
+        parabolic=parabolic,
+        tuning=fit,
     )
 
 
@@ -407,16 +399,6 @@ def _level_at(level: Floats, side: Reals, tuning: FitTuning) -> Reals:
     """Return how much of the lane's level the ground has, so far to the right of the middle, 0 to 1."""
     centres = (np.arange(len(level)) - (len(level) - 1) / 2) * (2 * tuning.profile / _BINS)
     return np.interp(side, centres, level)
-
-
-def _products(design: Singles, weights: Singles, *, parabolic: bool) -> Floats:
-    """Return the normal equations of a design (6, N), right-hand side included: shape (6, 6)."""
-    if not parabolic:
-        design[2] = 0
-    products: Floats = (design * weights).dot(design.T).astype(np.float64)
-    if not products[0, 0] > 0:
-        raise EstimationError(HARDLY_A_PIXEL)
-    return products
 
 
 def _moved(model: RoadModel, products: Floats) -> RoadModel:

@@ -133,9 +133,7 @@ def tile_sums(disparity: NDArray[Any], usable: NDArray[np.bool_], side: int) -> 
     """
     height, width = disparity.shape
     rows, columns = -(-height // side), -(-width // side)
-    grid = Grid.of_shape(height, width)
-    p = (np.arange(columns * side) - grid.centre_u) / grid.scale
-    q = (np.arange(rows * side) - grid.centre_v) / grid.scale
+    p, q = Grid.of_shape(height, width).normalised(np.arange(columns * side), np.arange(rows * side))
     gram = np.empty((rows, columns, 4, 4))
     for row in range(rows):
         part = slice(row * side, (row + 1) * side)

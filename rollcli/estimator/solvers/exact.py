@@ -83,10 +83,13 @@ def minima(energy: Energy) -> list[Minimum]:
     list of Minimum
         At least one, at most five. Those whose energies agree to rounding are ordered by abs(theta).
     """
-    if not energy.parabolic:
-        return [_line_minimum(energy)]
+    if not energy.parabolic:  # a quadratic in tan(theta) [TITS]; its minimum is the angle of the best plane
+        _, c1, c2 = energy.plane
+        theta = principal(math.atan2(-c1, c2))
+        return [Minimum(theta, float(energy.at(theta).value))]
     frame = _even_frame(energy)
-    starts = zeros(_numerator(energy, frame))
+    over, under = energy.as_quotient(*frame.dot(_CIRCLE))
+    starts = zeros(derivative(over) * under - over * derivative(under))
     found, same = _settled(energy, _thetas(frame, starts)), 1e-12 * (energy.rest + energy.slope_energy)
     if 2 * len(found) != len(starts):  # else there is a maximum between two minima
         coarse = [Minimum(theta, energy.at(theta).value) for theta in _thetas(frame, _ANGLES.tolist())]
@@ -95,20 +98,6 @@ def minima(energy: Energy) -> list[Minimum]:
             found += _settled(energy, [low.theta]) or [low]
     lowest = min(found, key=lambda m: m.energy)
     return sorted(found, key=lambda m: (m.energy if m.energy > lowest.energy + same else -1.0, abs(m.theta)))
-
-
-def _line_minimum(energy: Energy) -> Minimum:
-    """Solve the quadratic in tan(theta) of a2 = 0 [TITS]: its minimum is the angle of the best plane."""
-    _, c1, c2 = energy.plane
-    theta = principal(math.atan2(-c1, c2))
-    return Minimum(theta, float(energy.at(theta).value))
-
-
-def _numerator(energy: Energy, frame: Floats) -> Floats:
-    """Return the numerator of the derivative at even angles of a frame, shape (SAMPLES,)."""
-    over, under = energy.as_quotient(*(frame.dot(_CIRCLE)))
-    numerator: Floats = derivative(over) * under - over * derivative(under)
-    return numerator
 
 
 def _even_frame(energy: Energy) -> Floats:
