@@ -97,7 +97,7 @@ def _corrected(odd, columns=None, **options):
 
 def _drive():
     """What pairs of one rig say together of its columns, px in the corners."""
-    views = _scene(), _scene(seed=4), _scene("open", 9)
+    views = _scene(), _scene(seed=4), _scene("open", 10)
     found = [match_pair(left, _moved(right, **ODD), StereoOptions()).measured for left, right in views]
     told = column_support(ColumnEvidence.of_drive([each.evidence for each in found]))
     parts = Misalignment(scale=told.scale, twist=told.twist, curve=told.pitch)
