@@ -141,14 +141,14 @@ def _of_one(
     if found.drifts and moved:
         yield f"{quantity.name}{where} drifted by {drift_in_words(rig, drive, quantity)}"
     if found.now.ci95 is None:
-        yield f"no interval for the {quantity.name}{where}: {too_few(found)}"
+        yield f"no interval for the {quantity.name}{where}: {too_few(found, quantity)}"
 
 
-def too_few(found: SequenceAssessment) -> str:
-    """Return why there is no interval, and how far the frames spread."""
+def too_few(found: SequenceAssessment, quantity: Quantity = ROLL) -> str:
+    """Return why a quantity has no interval, and how far the frames spread."""
     if not found.used:
         return "no frame counts"
     if found.used == 1:
         return "a single frame"
-    spread = float(np.ptp(found.series.values[found.series.used]))
-    return f"{found.used:,} frames, which spread over {spread:.2f}; an interval takes {TUNING.fewest}"
+    spread = f"{np.ptp(found.series.values[found.series.used]):.2f}{quantity.unit}"
+    return f"{found.used:,} frames, which spread over {spread}; an interval takes {TUNING.fewest}"

@@ -289,7 +289,7 @@ def _expected(
         of = f"{'at' if found.drifts else 'of'} {_frames(rig, drive, first, end)}"
         what = f"the {quantity.name} {of} is {answer(value, quantity)}"
         limit = f"{within:g}{quantity.unit} from {wanted:g}{quantity.unit}"
-        yield _told(name, what, value, within, limit, too_few(found), wanted)
+        yield _told(name, what, value, within, limit, too_few(found, quantity), wanted)
 
 
 def _told(
