@@ -169,8 +169,10 @@ def _likenesses(
         yield f"looks like a photograph, not a disparity map: {remedies.photograph}"
     if _grows_downward(disparity):
         return
-    inverse = np.divide(1, disparity, out=np.zeros_like(disparity), where=disparity > 0)
-    depth = options.encoding.encoding != Encoding.DEPTH and _has_road(inverse, options)
+    depth = options.encoding.encoding != Encoding.DEPTH
+    if depth:
+        inverse = np.divide(1, disparity, out=np.zeros_like(disparity), where=disparity > 0)
+        depth = _has_road(inverse, options)
     reversed_rows = _has_road(disparity[::-1], options)
     if depth and reversed_rows:  # few roads tell which
         yield f"looks like a depth map: {remedies.depth}; or it is {_UPSIDE_DOWN}"

@@ -65,7 +65,9 @@ def every_path(frame: Frame, images: ImageOptions, root: str = "") -> list[str]:
 
 def images_of(frames: Iterable[Frame], images: ImageOptions) -> Iterator[str]:
     """Yield every image that may be written for frames; a list of them would take most of our memory."""
-    return (path for frame in frames if images.folders() for path in every_path(frame, images))
+    if not images.folders():
+        return iter(())
+    return (path for frame in frames for path in every_path(frame, images))
 
 
 def write_outputs(

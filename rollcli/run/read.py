@@ -156,7 +156,8 @@ def read_source(frame: Frame, options: FrameOptions) -> Source:
     if frame.right_file:
         return _match(frame, options)
     source = _read(frame, options)
-    return replace(source, allowed=region_mask(frame.mask, options, source.disparity.shape))
+    allowed = region_mask(frame.mask, options, source.disparity.shape)
+    return source if allowed is None else replace(source, allowed=allowed)
 
 
 def _read(frame: Frame, options: FrameOptions) -> Source:
@@ -237,14 +238,16 @@ def matched_source(
     match = match_pair(left, right, options, wanted)
     searched = (match.min_disparity, match.min_disparity + match.num_disparities - 1)
     height, width = left.shape[:2]
-    # rounded: a resumed run reads them from its rows
-    lies = () if match.lies is None else match.lies.values(*match.disparity.shape)
+    alignment = {}
+    if match.lies is not None:  # rounded: a resumed run reads them from its rows
+        lies = zip(ALIGNMENT_COLUMNS, match.lies.values(*match.disparity.shape), strict=True)
+        alignment = {name: round(each, 4) for name, each in lies}
     return Source(
         match.disparity,
         searched=searched,
         slope_error=match.slope_error,
         doubts={"range": _doubt_of_range(match), "match": match.doubt},
-        alignment={name: round(each, 4) for name, each in zip(ALIGNMENT_COLUMNS, lies, strict=False)},
+        alignment=alignment,
         size=(width, height),
         whole=match.whole,
     )
