@@ -51,7 +51,8 @@ class ImageKind(NamedTuple):
             return (ENDING_OF_FORMAT["tiff" if save_as == "png" else save_as],)
         if self.holds == "as input" and not computed:
             return (None,)
-        return tuple(map(ENDING_OF_FORMAT.__getitem__, ("png", "tiff") if save_as == "png" else (save_as,)))
+        formats: tuple[Save, ...] = ("png", "tiff") if save_as == "png" else (save_as,)
+        return tuple(ENDING_OF_FORMAT[each] for each in formats)
 
 
 KINDS = (

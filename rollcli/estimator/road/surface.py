@@ -255,9 +255,15 @@ class NearPixels:
         fade = np.exp(-np.square(np.square(np.minimum(np.square(side / np.float32(tuning.profile)), 4))))
         weights = (_level_at(level, side, tuning) * fade).astype(np.float32)
         kept = (weights > 1e-3).nonzero()[0]  # others would only take time
-        others = {name: getattr(self, name)[kept] for name in ("d", "alone", "tolerance", "ahead")}
-        place = self.place[kept] * weights[kept]
-        return level, replace(self, places=self.places[:, kept], place=place, **others)
+        return level, replace(
+            self,
+            places=self.places[:, kept],
+            d=self.d[kept],
+            alone=self.alone[kept],
+            tolerance=self.tolerance[kept],
+            place=self.place[kept] * weights[kept],
+            ahead=self.ahead[kept],
+        )
 
     def fitted(self, start: RoadModel) -> tuple[RoadModel, Singles, Singles, float, float]:
         """Fit (a0, a1, a2, theta) and the camber, starting from the lane's.

@@ -138,7 +138,10 @@ class PoolExecutor(Generic[Task, Result]):
     def close(self, *, at_once: bool) -> None:
         """End the workers: after their current task, or at once."""
         for worker in self._pool:
-            (worker.kill if at_once else worker.stop)()
+            if at_once:
+                worker.kill()
+            else:
+                worker.stop()
         for worker in self._pool:
             worker.join()
 
