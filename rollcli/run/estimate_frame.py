@@ -76,7 +76,7 @@ def _calibration(frame: Frame, source: Source, estimate: RollEstimate) -> Calibr
 
 
 def _row(frame: Frame, source: Source, estimate: RollEstimate, note: str, likeness: str) -> Row:
-    reasons = list(filter(None, [likeness, estimate.message, source.doubt, note]))
+    reasons = list(filter(None, [likeness, estimate.message, source.doubt, source.note, note]))
     said = {**estimate.to_dict(), **source.alignment, "message": "; ".join(reasons)}
     if source.doubt:
         said["status"] = "suspect"

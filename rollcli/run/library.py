@@ -194,7 +194,6 @@ def estimate_pair(
     request = replace(request, slope_error=source.slope_error)
     height, width = left.shape[:2]
     estimate = estimator.estimate_roll(source.disparity, request, mask=allowed, road_mask=road_mask)
-    if source.doubt:
-        message = "; ".join(filter(None, [estimate.message, source.doubt]))
-        estimate = replace(estimate, status="suspect", message=message)
+    message = "; ".join(filter(None, [estimate.message, source.doubt, source.note]))
+    estimate = replace(estimate, status="suspect" if source.doubt else estimate.status, message=message)
     return estimate if rig is None else with_pose(estimate, rig.for_size(width, height))

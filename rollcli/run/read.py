@@ -75,6 +75,7 @@ def _size(shape: tuple[int, ...]) -> str:
 
 # when more of the map than this lies at the end of the searched range, the range was too short
 _MUCH_AT_END = 0.05
+_LACKS_ROAD = "matched over the whole range, as too little road was found to match along"
 
 
 @dataclass(frozen=True)
@@ -99,6 +100,8 @@ class Source:
         Standard deviation of a slope that all disparities may have beside the road's, px per px.
     doubts : mapping of str to str
         Why the map itself may be wrong, by code.
+    note : str
+        What else a row says of the map; no reason for doubt.
     alignment : mapping of str to float
         How the right view lay, by column of a result; empty for a map, and where that could not be told.
     size : tuple of int, or None
@@ -117,6 +120,7 @@ class Source:
     searched: tuple[int, int] | None = None
     slope_error: float = 0.0
     doubts: Mapping[str, str] = field(default_factory=dict)
+    note: str = ""
     alignment: Mapping[str, Any] = field(default_factory=dict)
     size: tuple[int, int] | None = None
     whole: NDArray[Any] | None = None
@@ -247,6 +251,7 @@ def matched_source(
         searched=searched,
         slope_error=match.slope_error,
         doubts={"range": _doubt_of_range(match), "match": match.doubt},
+        note=_LACKS_ROAD if match.lacks_road else "",
         alignment=alignment,
         size=(width, height),
         whole=match.whole,

@@ -153,11 +153,20 @@ class Levelled:
         assert self._small is not None
         return resampled(self._small, self.shape)
 
+    @property
+    def _wants_road(self) -> bool:
+        whole = self.find_road is None or self.search.first < 0
+        return not whole and self.search.options.is_default and self.shape[0] >= _LEAST_HEIGHT
+
     @cached_property
     def road(self) -> "_Near | None":
         """The rows that the road's plane reaches, matched along it; None where too little of it is found."""
-        narrow = self.search.options.is_default and self.shape[0] >= _LEAST_HEIGHT
-        return _match_along(self, self.plane, self.coarse) if narrow and self.plane else None
+        return _match_along(self, self.plane, self.coarse) if self._wants_road and self.plane else None
+
+    @property
+    def lacks_road(self) -> bool:
+        """Whether the road was to be matched along its plane, and too little of any was found."""
+        return self._wants_road and self.road is None
 
     def along(self, plane: Map, middle: int, rows: slice) -> Views:
         """Return some rows of both views, the right one warped so that a plane lies at a disparity `middle`.

@@ -134,6 +134,9 @@ class StereoMatch:
     measured : Measured or None
         How the right view lies, with the standard error of each part, px of the size matched at; None where
         that was not asked, or could not be told.
+    lacks_road : bool
+        Whether the road was to be matched along its plane, and too little of any was found: all below the
+        horizon was then matched over the whole range.
     slope_error : float
         Standard deviation of the slope along the rows that levelling left in the disparities, px per px; 0 if
         nothing was measured and corrected.
@@ -148,6 +151,7 @@ class StereoMatch:
     end_fraction: float
     corrected: Misalignment
     measured: Measured | None
+    lacks_road: bool
     slope_error: float
     doubt: str
 
@@ -273,8 +277,12 @@ def match_pair(
     def levelled(lies: Misalignment) -> Levelled:
         return Levelled(views, lies, look.disparity, search, wanted.road)
 
+    pair: Levelled
+
     def match(lies: Misalignment) -> Map:
-        return match_for_road(levelled(lies))
+        nonlocal pair
+        pair = levelled(lies)
+        return match_for_road(pair)
 
     support, doubt = None, ""
     if options.measures_alignment:
@@ -313,6 +321,7 @@ def match_pair(
         end_fraction=np.count_nonzero(matched >= first + count - 2) / valid if valid else 0.0,
         corrected=corrected,
         measured=measured,
+        lacks_road=pair.lacks_road,
         slope_error=support.error,
         doubt=doubt,
     )

@@ -135,11 +135,13 @@ def test_along_a_plane_that_is_no_road_nothing_is_matched(street, whole, wrong):
     both = (found.disparity[below] > 0) & (whole.disparity[below] > 0)
     assert both.sum() > 0.98 * (whole.disparity[below] > 0).sum()
     assert (np.abs(found.disparity - whole.disparity)[below][both] < 0.1).mean() > 0.98
+    assert found.lacks_road
 
 
 def test_without_a_road_all_is_matched_as_a_whole(street, whole):
     found = match_pair(street.left, street.right, StereoOptions(), Wanted(road=lambda small: None))
     np.testing.assert_array_equal(found.disparity, whole.disparity)
+    assert found.lacks_road
 
 
 @pytest.mark.parametrize(
@@ -151,12 +153,14 @@ def test_who_sets_how_to_match_gets_that_match_of_the_road(street, given):
     found, whole = (match_pair(street.left, street.right, options, wanted) for wanted in (ROAD, Wanted()))
     below = np.s_[300:]
     assert (np.abs(found.disparity - whole.disparity)[below] < 0.1).mean() > 0.98
+    assert not found.lacks_road  # none was asked for
 
 
 @pytest.mark.parametrize("given", [{"align": "off"}, {"vertical_offset": 0.0}])
 def test_a_given_alignment_changes_no_road_of_level_views(street, road, given):
     found = match_pair(street.left, street.right, StereoOptions(**given), ROAD)
     np.testing.assert_array_equal(found.disparity, road.disparity)
+    assert not found.lacks_road
 
 
 def test_behind_the_horizon_all_is_matched_as_a_whole(street):
