@@ -159,7 +159,7 @@ def option(names: str, kind: ParamType, text: str, *needs: Needs, **attributes: 
     names : str
         Such as "-q, --quiet".
     kind : ParamType
-        What it takes; `FLAG`: nothing.
+        What it takes; `FLAG`: nothing. Its `metavar`, if it has one, stands for it in the help.
     text : str
         Its help.
     *needs : Needs
@@ -168,7 +168,9 @@ def option(names: str, kind: ParamType, text: str, *needs: Needs, **attributes: 
         What else `click.option` and `Option` take.
     """
     given: dict[str, Any] = {"is_flag": True} if kind is FLAG else {"type": kind}
-    return click.option(*names.split(", "), cls=Option, help=text, only_with=needs, **given, **attributes)
+    given["metavar"] = getattr(kind, "metavar", None)  # click would turn a type's name into capitals
+    attributes = {**given, **attributes}
+    return click.option(*names.split(", "), cls=Option, help=text, only_with=needs, **attributes)
 
 
 def section(title: str, *declarations: Declaration, only_with: Sequence[Needs] = ()) -> Declaration:

@@ -143,7 +143,7 @@ simulate_options = record(
         )
     ]
 )
-@click.argument("folder", type=DIR)
+@click.argument("folder", type=DIR, metavar="DIR")
 @simulate_options
 @running_options
 @config_option

@@ -28,32 +28,20 @@ class Choice(_Choice):
 
     def __init__(self, *words: str) -> None:
         super().__init__(words, case_sensitive=False)
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        """Show the words as they are given: versions of click differ in that."""
-        return f"[{'|'.join(self.choices)}]"
+        self.metavar = f"[{'|'.join(words)}]"  # as they are given: versions of click differ in that
 
 
 FLAG = click.BOOL  # of options that are given alone
 
 
-class _Named:
-    """A type with a placeholder of its own in the help, which click would turn into capitals."""
-
-    metavar: str | None = None
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str | None:
-        return self.metavar
-
-
-class Text(_Named, click.types.StringParamType):
+class Text(click.types.StringParamType):
     """Any text."""
 
     def __init__(self, metavar: str) -> None:
         self.metavar = metavar
 
 
-class FilePath(_Named, click.Path):
+class FilePath(click.Path):
     """The name of a file or folder; an empty one, which would mean the current folder, is refused."""
 
     def __init__(self, metavar: str | None = None) -> None:
@@ -102,7 +90,7 @@ def table_format(given: str | None, output: str) -> str:
     return given or (ending if ending in TABLE_FORMATS[1:] else TABLE_FORMATS[0])
 
 
-class Number(_Named, ParamType):
+class Number(ParamType):
     """A finite number within bounds, with its unit as the placeholder; "auto" where that is allowed."""
 
     def __init__(
@@ -151,7 +139,7 @@ class Number(_Named, ParamType):
         )
 
 
-class Parsed(_Named, ParamType):
+class Parsed(ParamType):
     """What a function makes of a text, or of a value of TOML; its ValueError or TypeError refuses the value.
 
     Parameters

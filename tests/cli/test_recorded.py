@@ -47,7 +47,7 @@ def _converted(kind, text):
 def _value(line):
     kind, _, text = line.partition(" ")
     kind = KINDS.get(kind) or getattr(types, kind)
-    return [kind.get_metavar(None), _converted(kind, text)]
+    return [kind.metavar, _converted(kind, text)]
 
 
 def _numbers(kind):

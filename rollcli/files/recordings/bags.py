@@ -217,6 +217,12 @@ class _Chunked:
         unpacking = _unpacking(compression, self._file.read(there))
         return _Source(unpacking, size, at_once=at_once or there < packed)
 
+    def _bare(self, offset: int, after: int, wanted: _Wanted) -> _Records:
+        """Return the message that is a record of its own, in no chunk."""
+        self._file.seek(offset)
+        size = after - offset
+        return self._walked(_Source(self._file, min(size, self._size - offset)), wanted, size, after)
+
     def _walked(self, source: _Source, wanted: _Wanted, size: int, after: int) -> _Records:
         """Return the messages that are whole in a record of a size, each with as many bytes as are wanted."""
         found: list[tuple[int, int, memoryview]] = []
@@ -268,14 +274,11 @@ class _Mcap(_Chunked):
         if opcode not in (0x03, 0x04, 0x05, 0x06):
             return _Records([], after, after <= self._size)
         if opcode != 0x06:
-            self._file.seek(offset)
-            size = after - offset
-            content: _Source = _Source(self._file, min(size, self._size - offset))
-        else:
-            size, name_length = struct.unpack("<16xQ4xI", _exactly(self._file, 32))
-            compression = _exactly(self._file, name_length + 8)[:-8].decode()
-            packed = after - self._file.tell()
-            content = self._content(compression, packed, size, at_once=at_once)
+            return self._bare(offset, after, wanted)
+        size, name_length = struct.unpack("<16xQ4xI", _exactly(self._file, 32))
+        compression = _exactly(self._file, name_length + 8)[:-8].decode()
+        packed = after - self._file.tell()
+        content = self._content(compression, packed, size, at_once=at_once)
         return self._walked(content, wanted, size, after)
 
     def _message(self, source: _Source) -> tuple[int, int, int] | None:
@@ -325,13 +328,10 @@ class _Ros1(_Chunked):
         if op not in (0x02, 0x05, 0x07):
             return _Records([], after, after <= self._size)
         if op != 0x05:
-            self._file.seek(offset)
-            size = after - offset
-            content: _Source = _Source(self._file, min(size, self._size - offset))
-        else:
-            (size,) = struct.unpack("<I", fields[b"size"])
-            compression = fields[b"compression"].decode()
-            content = self._content(compression, length, size, at_once=at_once)
+            return self._bare(offset, after, wanted)
+        (size,) = struct.unpack("<I", fields[b"size"])
+        compression = fields[b"compression"].decode()
+        content = self._content(compression, length, size, at_once=at_once)
         return self._walked(content, wanted, size, after)
 
     def _message(self, source: _Source) -> tuple[int, int, int] | None:
