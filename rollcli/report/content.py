@@ -22,11 +22,10 @@ from rollcli.report.summary import (
     with_interval,
     written_at,
 )
-from rollcli.rig.calibration import Calibration
 from rollcli.rig.drive.assess import RigAssessment
 from rollcli.rig.quantities import QUANTITIES
 from rollcli.rig.words import answer, counts, decimals, findings, now_in_words
-from rollcli.run.resume import recorded_options
+from rollcli.run.resume import recorded_calibrations, recorded_options
 from rollcli.run.rig_gates import NOT_SEEN, Health, health_of
 
 _FOLDERS = 6  # of inputs that the summary names
@@ -83,19 +82,12 @@ def report_page(
 
 
 def _health(rig: RigAssessment, run: Mapping[str, Any]) -> Health | None:
+    calibration = next(iter(recorded_calibrations(run)), None)
     downscale = recorded_options(run, "the result's record").stereo.downscale
     try:
-        return health_of(rig, _calibration(run), downscale)
+        return health_of(rig, calibration, downscale)
     except UsageError:  # where frames have their own, the first may be of another size than the last drive
         return health_of(rig)
-
-
-def _calibration(run: Mapping[str, Any]) -> Calibration | None:
-    """Return the first calibration that the run's record lists; None where there is none to be read."""
-    try:
-        return Calibration(**run["calibration"]["first"][0])
-    except (KeyError, IndexError, TypeError, ValueError):
-        return None
 
 
 def _others(rig: RigAssessment) -> list[str]:

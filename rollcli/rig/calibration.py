@@ -174,6 +174,19 @@ class Calibration:
         )
 
 
+def for_matched(calibration: Calibration, width: int, height: int, downscale: float) -> Calibration:
+    """Return the calibration of views that were matched at this size, 1/downscale of the images'.
+
+    Raises
+    ------
+    UsageError
+        See `Calibration.for_size`.
+    """
+    if calibration.width is None:  # its numbers are for the images as they are
+        calibration = calibration.for_size(round(width * downscale), round(height * downscale))
+    return calibration.for_size(width, height)
+
+
 def require_calibration(calibration: object) -> None:
     """Refuse what is given as a calibration and is none, such as a path.
 

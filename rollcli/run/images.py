@@ -203,7 +203,7 @@ def _counted(source: Source, of: Frame, options: VDisparityOptions, paths: Seque
         from rollcli.pictures.figures import v_disparity_figure  # loads matplotlib, an extra
 
         road: Row | RollEstimate = of.row or estimate_roll(source.disparity)
-        theta = math.radians(road.roll_deg or 0.0) if isinstance(road, Row) else road.theta
+        theta = math.radians(road.map_roll_deg or 0.0) if isinstance(road, Row) else road.theta
         figure = v_disparity_figure(source.disparity, theta, road.alpha, options.figure, **counting)
         return {paths[0]: figure}, dict(source.warnings)
     histogram = v_disparity(source.disparity, **counting)

@@ -6,13 +6,13 @@ of its limit.
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from rollcli.errors import ExitStatus, UsageError
 from rollcli.files.naming import listed
-from rollcli.rig.calibration import Calibration
+from rollcli.rig.calibration import Calibration, for_matched
 from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
 from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.drive.quantity import SequenceAssessment
@@ -156,10 +156,8 @@ def health_of(
         return None
     quantities, size = found
     parts = tuple(each.now for each in quantities)
-    if calibration is not None and calibration.width is not None:
-        calibration = calibration.for_size(*size)
-    elif calibration is not None:
-        calibration = replace(calibration, fx=calibration.fx / downscale)
+    if calibration is not None:
+        calibration = for_matched(calibration, *size, downscale)
     return Health(quantities[0].used, parts, size, _reach(parts, *size), calibration)
 
 

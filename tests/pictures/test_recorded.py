@@ -99,6 +99,7 @@ def _roads():
     full |= {"alpha0": 1.0, "alpha1": 0.3, "alpha2": 1e-3}
     lacking = [
         {},
+        {"image_roll_deg": 4.5},
         *({name: None} for name in ("pitch_deg", "camber", "roll_deg", "width", "height", "alpha1")),
     ]
     rows = [Row("a.png", status="ok", **full | each) for each in lacking]
