@@ -231,6 +231,7 @@ CASES = {
             made(derotate, np.ones((2, 2)), *angles)
             for angles in ((), (3.14,), (3.15,), (-3.2,), (math.nan,))
         ),
+        *(made(derotate, np.ones((2, 2)), roll_deg=angle) for angle in (180, -181)),
         *(
             made(derotate, np.ones(shape, kind), 0.1)
             for shape, kind in ((4, "f8"), ((2, 2, 2), "f8"), ((2, 2), "c8"))
