@@ -123,6 +123,8 @@ def _radians(roll: float | None, roll_deg: float | None) -> float:
         raise UsageError(f"cannot rotate by {angle} radians")
     if roll is not None and abs(roll) > math.pi:
         raise UsageError(f"a roll of {roll:g} radians is beyond pi: give degrees as roll_deg={roll:g}")
+    if abs(angle) > math.pi:
+        raise UsageError(f"a roll of {roll_deg:g} degrees is more than half a turn: give one within 180")
     return angle
 
 

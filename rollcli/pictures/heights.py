@@ -81,13 +81,13 @@ class FittedRoad:
     def of_row(cls, row: Row, calibration: Calibration | None) -> "FittedRoad | None":
         """Take the road of a row of a result; None where the row has none.
 
-        The roll of a row with a pitch is the rig's: where fx and fy differ, `calibration` turns it back into
-        that of the pixels.
+        The roll of a row with a pitch is the rig's: where fx and fy differ and the row has that alone,
+        `calibration` turns it back into that of the pixels.
         """
-        if row.roll_deg is None or row.width is None or row.height is None or row.alpha is None:
+        if row.map_roll_deg is None or row.width is None or row.height is None or row.alpha is None:
             return None
-        theta = math.radians(row.roll_deg)
-        if calibration is not None and row.pitch_deg is not None:
+        theta = math.radians(row.map_roll_deg)
+        if calibration is not None and row.pitch_deg is not None and row.image_roll_deg is None:
             theta = math.atan2(math.sin(theta) * calibration.fy / calibration.fx, math.cos(theta))
         return cls(RoadModel(theta, row.alpha, row.camber or 0.0), row.width, row.height)
 

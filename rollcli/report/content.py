@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rollcli import __version__
+from rollcli.errors import UsageError
 from rollcli.files.naming import listed
 from rollcli.files.results import Result, Row
 from rollcli.files.stores.locations import public_name
@@ -21,11 +22,11 @@ from rollcli.report.summary import (
     with_interval,
     written_at,
 )
-from rollcli.rig.calibration import Calibration
 from rollcli.rig.drive.assess import RigAssessment
 from rollcli.rig.quantities import QUANTITIES
 from rollcli.rig.words import answer, counts, decimals, findings, now_in_words
-from rollcli.run.rig_gates import NOT_SEEN, health_of
+from rollcli.run.resume import recorded_calibrations, recorded_options
+from rollcli.run.rig_gates import NOT_SEEN, Health, health_of
 
 _FOLDERS = 6  # of inputs that the summary names
 _LISTED = 20  # doubtful frames in a list of their own; the table has all
@@ -68,7 +69,7 @@ def report_page(
         now=now_in_words(rig),
         others=_others(rig),
         counts=counts(rig),
-        health=health_of(rig, _calibration(run)),
+        health=_health(rig, run),
         not_seen=NOT_SEEN,
         findings=findings(rig) or ["Neither a jump nor a drift is seen."],
         outside=outside(rows),
@@ -80,12 +81,13 @@ def report_page(
     )
 
 
-def _calibration(run: Mapping[str, Any]) -> Calibration | None:
-    """Return the first calibration that the run's record lists; None where there is none to be read."""
+def _health(rig: RigAssessment, run: Mapping[str, Any]) -> Health | None:
+    calibration = next(iter(recorded_calibrations(run)), None)
+    downscale = recorded_options(run, "the result's record").stereo.downscale
     try:
-        return Calibration(**run["calibration"]["first"][0])
-    except (KeyError, IndexError, TypeError, ValueError):
-        return None
+        return health_of(rig, calibration, downscale)
+    except UsageError:  # where frames have their own, the first may be of another size than the last drive
+        return health_of(rig)
 
 
 def _others(rig: RigAssessment) -> list[str]:

@@ -15,10 +15,11 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.encodings import read_disparity, to_disparity
 from rollcli.files.formats import read_image, read_stored
 from rollcli.pictures.derotate import derotate
-from rollcli.pictures.heights import CAMERA_HEIGHTS, METRES, FittedRoad, heights_over, steadied
+from rollcli.pictures.heights import CAMERA_HEIGHTS, METRES, FittedRoad, heights_over, steadied, unit_of
 from rollcli.pictures.overlay import draw_disparity, draw_heights, draw_road_on_photo
 from rollcli.pictures.vdisparity import draw_v_disparity, row_offset, v_disparity
 from rollcli.report.sources import Subject
+from rollcli.rig.calibration import for_matched
 from rollcli.run.read import FRAME_ERRORS, Source, read_source
 
 # small enough that a page with a dozen frames opens at once, large enough to see a stripe of noise
@@ -140,7 +141,7 @@ def _level_counts(
 def _heights(subject: Subject, source: Source | None) -> NDArray[Any]:
     """Draw the heights over the road: as `estimate` drew or wrote them, else those of the map.
 
-    Of a map they are in metres where the row has the camera's height.
+    Of a map they are in metres where there is a calibration or the row has the camera's height.
     """
     if "heights_preview" in subject.images:
         return read_image(subject.images["heights_preview"])
@@ -150,11 +151,19 @@ def _heights(subject: Subject, source: Source | None) -> NDArray[Any]:
     if "heights" in subject.images:
         written = read_stored(subject.images["heights"]).values.astype(np.float32)
         return draw_heights(written, span, unit, photo)
-    disparity = _required(None if source is None else source.shown)
-    road = FittedRoad.of_row(subject.row, None)
+    disparity, calibration = _required(None if source is None else source.shown), subject.frame.calibration
+    if calibration is not None:
+        height, width = disparity.shape
+        downscale = subject.options.stereo.downscale if subject.frame.right_file else 1.0
+        calibration = for_matched(calibration, width, height, downscale)
+    road = FittedRoad.of_row(subject.row, calibration)
     if road is None:
         raise InputError(f"{subject.frame.file}: its row has no road")
-    heights = heights_over(disparity, road, None) * np.float32(camera or 1.0)
+    heights = heights_over(disparity, road, calibration)
+    if unit_of(calibration) == METRES:
+        unit = METRES
+    else:
+        heights *= np.float32(camera or 1.0)
     return draw_heights(steadied(heights) if subject.frame.right_file else heights, span, unit, photo)
 
 

@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rollcli.errors import ExitStatus, InputError, UsageError
@@ -18,7 +19,7 @@ from rollcli.rig.drive.assess import RigAssessment, assess_rig
 from rollcli.run.options import EncodingOptions
 from rollcli.run.outputs import listed_only
 from rollcli.run.progress import Progress
-from rollcli.run.resume import recorded_options
+from rollcli.run.resume import recorded_calibrations, recorded_options
 from rollcli.run.rig import order_of, origins_of
 from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import stop_on_signals
@@ -162,5 +163,10 @@ def _subjects(
         mine = {place: row for place, owner, row in chosen if owner == number}
         if mine or len(parts) == 1:
             of_part = subjects([*mine.values()], part.path, options.images, made, fetch=options.fetch)
+            calibrations = recorded_calibrations(part.run)
+            if len(calibrations) == 1:
+                of_part = [
+                    replace(each, frame=replace(each.frame, calibration=calibrations[0])) for each in of_part
+                ]
             found |= dict(zip(mine, of_part, strict=True))
     return [found[place] for place, _, _ in chosen]

@@ -32,6 +32,7 @@ _ROUNDINGS = (-0.5, 0.0, -1.0)
 _FOCAL = (1.0, 1e6)  # px
 _PLACE = 1e6  # px from the first pixel
 _BASELINE = (1e-4, 1e4)  # m
+LIKELY_BASELINE = (0.005, 5.0)  # m: no rig on a vehicle is smaller or larger: another number has another unit
 _OFF = 0.12  # as a factor from 1: lenses are centred to a few hundredths, and common scalings are beyond it
 _EDGE = 0.1  # of a side: there lies the principal point of twice the size, but hardly that of a crop
 
@@ -171,6 +172,19 @@ class Calibration:
             width=width,
             height=height,
         )
+
+
+def for_matched(calibration: Calibration, width: int, height: int, downscale: float) -> Calibration:
+    """Return the calibration of views that were matched at this size, 1/downscale of the images'.
+
+    Raises
+    ------
+    UsageError
+        See `Calibration.for_size`.
+    """
+    if calibration.width is None:  # its numbers are for the images as they are
+        calibration = calibration.for_size(round(width * downscale), round(height * downscale))
+    return calibration.for_size(width, height)
 
 
 def require_calibration(calibration: object) -> None:

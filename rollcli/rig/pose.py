@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from rollcli.estimator.estimate import RollEstimate
 from rollcli.estimator.interval import Tangent
-from rollcli.rig.calibration import Calibration
+from rollcli.rig.calibration import LIKELY_BASELINE, Calibration
 
 _AT_EDGE = "; its principal point lies near the edge: is it of images of this size?"
 
@@ -147,6 +147,9 @@ def taken_as_exact(calibration: Calibration, pitch: float, height: float | None)
         down = calibration.fx * calibration.baseline * math.cos(pitch) / height  # fx times the slope, px
         said += f", {0.1 * turn / down:.3f} per 0.1 px of disparity (vergence)"
         said += ", 1 % of height per 1 % of baseline"
+        least, most = LIKELY_BASELINE
+        if not least <= calibration.baseline <= most:
+            said += f"; its baseline is {calibration.baseline:g} m: is it in metres?"
     edge = _AT_EDGE if calibration.at_edge else ""
     return f"{'pitch and height take' if calibration.baseline is not None else 'pitch takes'} {said}{edge}"
 

@@ -106,12 +106,22 @@ class Pictured:
         return heights if self.source.stored is not None else steadied(heights)
 
 
+_IMAGES: dict[str, Callable[[Pictured, str], _Named]] = {
+    "derotated": Pictured.derotated,
+    "vdisparity": Pictured.vdisparity,
+    "disparity": Pictured.disparity,
+    "road_mask": Pictured.road_mask,
+    "heights": Pictured.heights,
+    "heights_preview": Pictured.heights_preview,
+}
+
+
 def encode_images(frame: Frame, pictured: Pictured) -> tuple[dict[str, bytes], str]:
     """Make the images that were requested, by their paths, and what the row should say of them."""
     images, note = {}, ""
     for kind, paths in possible_paths(frame, pictured.options.images):
         planned = pictured.options.at(paths[0])
-        target, data = getattr(pictured, kind.name)(planned)
+        target, data = _IMAGES[kind.name](pictured, planned)
         images[target] = data
         if target != planned:
             note = TOO_LARGE_FOR_PNG
@@ -203,7 +213,7 @@ def _counted(source: Source, of: Frame, options: VDisparityOptions, paths: Seque
         from rollcli.pictures.figures import v_disparity_figure  # loads matplotlib, an extra
 
         road: Row | RollEstimate = of.row or estimate_roll(source.disparity)
-        theta = math.radians(road.roll_deg or 0.0) if isinstance(road, Row) else road.theta
+        theta = math.radians(road.map_roll_deg or 0.0) if isinstance(road, Row) else road.theta
         figure = v_disparity_figure(source.disparity, theta, road.alpha, options.figure, **counting)
         return {paths[0]: figure}, dict(source.warnings)
     histogram = v_disparity(source.disparity, **counting)

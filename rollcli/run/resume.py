@@ -21,6 +21,7 @@ from rollcli.files.locking import differences, not_resumable
 from rollcli.files.results import Row, format_row, parse_rows, read_run, run_path
 from rollcli.files.storage import write_bytes
 from rollcli.files.stores.locations import base_name, public_name
+from rollcli.rig.calibration import Calibration
 from rollcli.run.batch import Batch, check_owned
 from rollcli.run.frame import Frame, ReadAs
 from rollcli.run.options import (
@@ -174,6 +175,14 @@ def _calibrations(frames: Sequence[Frame]) -> dict[str, Any]:
 
 
 _CALIBRATIONS_LISTED = 3
+
+
+def recorded_calibrations(run: Mapping[str, Any] | None) -> list[Calibration]:
+    """Read back the calibrations that a run's record lists; none where there are none to be read."""
+    try:
+        return [Calibration(**each) for each in (run or {})["calibration"]["first"]]
+    except (KeyError, TypeError, ValueError):
+        return []
 
 
 def is_replaceable_record(path: str) -> bool:

@@ -241,8 +241,9 @@ def run_rig(options: RigOptions) -> int:
         after, later, more = _assessed([options.against], options)
         missing, notes = missing or later, [*notes, *more]
         changes = {each.name: difference(rig.now(each), after.now(each)) for each in QUANTITIES}
-    health = health_of(rig, Calibrations(options.calibration).of(rig.frames.files[-1]))
-    checks = run_checks(rig, options.gates, missing, changes.get(ROLL.name), health)
+    calibration = Calibrations(options.calibration).of(rig.frames.files[-1])
+    health = health_of(rig, calibration, 1.0 if calibration is None else _downscale(options.results[-1]))
+    checks = run_checks(rig, options.gates, missing, changes.get(ROLL.name))
     found = Findings(rig, checks, after, changes, health)
     overwrite = options.running.overwrite
     data = FORMATS[options.format](found).encode("utf-8", "surrogateescape")
@@ -262,6 +263,10 @@ def run_rig(options: RigOptions) -> int:
     return status_of(checks)
 
 
+def _downscale(result: str) -> float:
+    return recorded_options(read_run(result), run_path(result)).stereo.downscale
+
+
 _PAIRS = 24  # matched again, a few seconds: 8 of rendered roads tell a scale to 0.02 %, one to 0.1
 _FEWEST = 4
 
@@ -270,7 +275,7 @@ def columns_of_drive(rig: RigAssessment, results: Sequence[str]) -> ColumnSuppor
     """Match some pairs of the last drive again, and put together what their rows say of the columns.
 
     One pair of an empty road cannot tell a right view that is larger from rows that are bent; the pairs of a
-    drive can, for its rig is one.
+    drive can, for its rig is one since its last jump.
 
     Returns
     -------
@@ -292,17 +297,27 @@ def columns_of_drive(rig: RigAssessment, results: Sequence[str]) -> ColumnSuppor
 
 
 def _pairs(rig: RigAssessment, results: Sequence[str]) -> Iterator[tuple[Frame, FrameOptions]]:
-    """Yield pairs of the last drive whose views were measured, evenly spread, and how they were matched."""
+    """Yield measured pairs of the rig as it is now, and how they were matched.
+
+    They are spread evenly over the last drive, from the last jump on; with a drift, they are its last ones.
+    """
     drive = rig.latest_drive(ALIGNMENT[0])
     if drive is None:
         return
-    told = drive.frames[np.isfinite(rig.frames.numbers[ALIGNMENT[0].column][drive.frames])]
+    parts = [drive.quantities[each.name] for each in ALIGNMENT if each.name in drive.quantities]
+    since = drive.frames[max(each.segments[-1].first for each in parts if each.segments) :]
+    told = since[np.isfinite(rig.frames.numbers[ALIGNMENT[0].column][since])]
+    if any(each.drifts for each in parts):
+        told = told[-_PAIRS:]
     chosen = told[np.linspace(0, len(told) - 1, min(_PAIRS, len(told))).astype(np.intp)]
-    names = {rig.frames.files[place] for place in chosen}
-    for result in results:
+    # results of several runs may have frames of one name
+    runs = list(dict.fromkeys(rig.frames.origins)) or [""] * len(results)
+    origins = rig.frames.origins or [""] * rig.count
+    names = {(origins[place], rig.frames.files[place]) for place in chosen}
+    for result, run in zip(results, runs, strict=True):
         options = recorded_options(read_run(result), run_path(result))
         options = options._replace(stereo=replace(options.stereo, align="auto", vertical_offset=None))
         for name, data in pieces_of(result):
             for row in parse_rows(data, name):
-                if row.file in names and row.right_file and not is_remote(row.file):
+                if (run, row.file) in names and row.right_file and not is_remote(row.file):
                     yield frame_of_row(row, result), options

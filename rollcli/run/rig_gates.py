@@ -12,9 +12,10 @@ import numpy as np
 
 from rollcli.errors import ExitStatus, UsageError
 from rollcli.files.naming import listed
-from rollcli.rig.calibration import Calibration
+from rollcli.rig.calibration import Calibration, for_matched
 from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
 from rollcli.rig.drive.posterior import Estimate
+from rollcli.rig.drive.quantity import SequenceAssessment
 from rollcli.rig.quantities import ALIGNMENT, HEIGHT, PITCH, ROLL, SIZE, Quantity
 from rollcli.rig.words import answer, frame_name, too_few
 from rollcli.run.options import GateOptions
@@ -132,11 +133,38 @@ class Health:
         ]
 
 
-def health_of(rig: RigAssessment, calibration: Calibration | None = None) -> Health | None:
-    """Return the health of the pair as it is at the end; None where no pair was measured."""
+def health_of(
+    rig: RigAssessment, calibration: Calibration | None = None, downscale: float = 1.0
+) -> Health | None:
+    """Return the health of the pair as it is at the end; None where no pair was measured.
+
+    Parameters
+    ----------
+    rig : RigAssessment
+    calibration : Calibration or None
+    downscale : float
+        The pairs were matched at 1/downscale of their size.
+
+    Raises
+    ------
+    UsageError
+        The calibration is of another view: see `Calibration.for_size`.
+    """
     drive = rig.latest_drive(ALIGNMENT[0])
-    if drive is None:
+    found = None if drive is None else _measured(rig, drive)
+    if found is None:
         return None
+    quantities, size = found
+    parts = tuple(each.now for each in quantities)
+    if calibration is not None:
+        calibration = for_matched(calibration, *size, downscale)
+    return Health(quantities[0].used, parts, size, _reach(parts, *size), calibration)
+
+
+def _measured(
+    rig: RigAssessment, drive: DriveAssessment
+) -> tuple[list[SequenceAssessment], tuple[int, int]] | None:
+    """Return how the right view lies over a drive, and the size of its views, px; None without pairs."""
     found = [drive.quantities[each.name] for each in ALIGNMENT if each.name in drive.quantities]
     if len(found) < len(ALIGNMENT) or any(each.now.value is None for each in found):
         return None
@@ -144,11 +172,10 @@ def health_of(rig: RigAssessment, calibration: Calibration | None = None) -> Hea
     if any(not np.isfinite(each).any() for each in sizes):
         return None
     width, height = (int(each[np.isfinite(each)][-1]) for each in sizes)
-    parts = tuple(each.now for each in found)
-    return Health(found[0].used, parts, (width, height), _reach(parts, width, height), calibration)
+    return found, (width, height)
 
 
-def _reach(parts: tuple[Estimate, ...], width: int, height: int) -> Estimate:
+def _reach(parts: Sequence[Estimate], width: int, height: int) -> Estimate:
     """Return the largest shift of the four corners, its interval that of a sum of independent parts."""
     values = [each.value or 0.0 for each in parts]
     value = Misalignment.of_values(values, height, width).reach(height, width)
@@ -203,7 +230,6 @@ def run_checks(
     gates: GateOptions,
     missing: str = "",
     change: Estimate | None = None,
-    health: Health | None = None,
 ) -> list[Check]:
     """Check what was asked; want of data tells nothing.
 
@@ -215,15 +241,13 @@ def run_checks(
         Why frames of the run are not there; empty when all are.
     change : Estimate or None
         Of the roll, against a later result.
-    health : Health or None
-        How the views of its pairs lie; None where there are none.
 
     Returns
     -------
     list of Check
         In the order of the options.
     """
-    checks = list(_checks(rig, gates, change, health))
+    checks = list(_checks(rig, gates, change))
     if checks and missing:
         checks.insert(0, Check("complete", None, missing))
     return checks
@@ -237,9 +261,7 @@ def status_of(checks: Sequence[Check]) -> ExitStatus:
     return ExitStatus.UNTOLD if None in states else ExitStatus.DONE
 
 
-def _checks(
-    rig: RigAssessment, gates: GateOptions, change: Estimate | None, health: Health | None
-) -> Iterator[Check]:
+def _checks(rig: RigAssessment, gates: GateOptions, change: Estimate | None) -> Iterator[Check]:
     height = gates.within if gates.within_height is None else gates.within_height
     for quantity, wanted, within in (
         (ROLL, gates.expect_roll, gates.within),
@@ -258,7 +280,9 @@ def _checks(
             jumps.append(_limited("max-jump", "change against the other result", change, gates.max_jump))
         yield _worst("max-jump", jumps)
     if gates.max_misalignment is not None:
-        yield _misalignment(health, gates.max_misalignment)
+        shifts = [check for drive in rig.drives for check in _shifts(rig, drive, gates.max_misalignment)]
+        no_pair = Check("max-misalignment", None, "how the views lie: no pair was measured")
+        yield _worst("max-misalignment", shifts or [no_pair])
     if gates.min_ok is not None:
         yield _share(rig, gates.min_ok)
 
@@ -327,17 +351,25 @@ def _jumps(rig: RigAssessment, drive: DriveAssessment, limit: float) -> Check:
 
 def _limited(name: str, what: str, found: Estimate, limit: float, why: str = "too few frames") -> Check:
     """Check a change that must not be larger than a limit."""
-    known = found.value is not None and found.ci95 is not None
-    said = f"the {what} is {answer(found, change=True)}" if known else f"the {what}"
-    return _told(name, said, found, limit, f"{limit:g}°", why)
+    return _told(name, f"the {what} is {answer(found, change=True)}", found, limit, f"{limit:g}°", why)
 
 
-def _misalignment(health: Health | None, limit: float) -> Check:
-    name = "max-misalignment"
-    if health is None:
-        return Check(name, None, "how the views lie: no pair was measured")
-    what = f"the largest vertical shift between the views is {answer(health.reach, PIXELS)}"
-    return _told(name, what, health.reach, limit, f"{limit:g} px", "too few pairs for an interval")
+def _shifts(rig: RigAssessment, drive: DriveAssessment, limit: float) -> Iterator[Check]:
+    """Yield a check of the pairs since the last jump, and where they drift one of each end; none without."""
+    measured = _measured(rig, drive)
+    if measured is None:
+        return
+    quantities, size = measured
+    last = [each.segments[-1] for each in quantities]
+    first, end = max(each.first for each in last), last[0].last
+    ends = [(first, end, [each.end for each in last])]
+    if any(each.drifts for each in quantities):
+        ends = [(first, first, [each.begin for each in last]), (end, end, [each.end for each in last])]
+    for begin, until, parts in ends:
+        reach = _reach(parts, *size)
+        views = f"the views of {_frames(rig, drive, begin, until)}"
+        what = f"the largest vertical shift between {views} is {answer(reach, PIXELS)}"
+        yield _told("max-misalignment", what, reach, limit, f"{limit:g} px", "too few pairs for an interval")
 
 
 def _share(rig: RigAssessment, least: float) -> Check:

@@ -2,6 +2,7 @@
 
 import json
 import math
+import shutil
 
 import cv2
 import numpy as np
@@ -27,6 +28,10 @@ def put_off(path, target):
 
 def rolls(path):
     return np.array([float(row["roll_deg"]) for row in rows_of(path.read_text())])
+
+
+def columns(path):
+    return json.loads(path.read_text())["columns"]
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +61,41 @@ def test_how_the_right_view_lies_is_found_within_its_interval_and_gated(pairs):
         assert abs(found[name] - truth) <= min(NEAR[name], found[f"{prefix}_ci95_{suffix}"])
     level = json.loads(rollcli("rig", "level.csv", "--format", "json", "-q", cwd=pairs).out)["alignment"]
     assert level["advice"] == "level"
+
+
+def test_each_drive_is_gated_and_the_correction_is_of_the_last_one_alone(pairs):
+    drives = ("level.csv", "off.csv", "--max-misalignment", "1", "-q")
+    assert rollcli("rig", "off.csv", "level.csv", *drives[2:], cwd=pairs).status == 4
+    assert rollcli("rig", *drives, "--correction", "last.json", cwd=pairs).status == 4
+    assert columns(pairs / "last.json") == columns(pairs / "use.json")
+
+
+def test_after_a_jump_the_correction_is_of_the_pairs_since(pairs):
+    (pairs / "both").mkdir()
+    lines = []
+    for part, name in enumerate(("level.csv", "off.csv")):
+        for path in (pairs / "left").iterdir():
+            shutil.copy(path, pairs / "both" / path.name.replace("frame", str(part)))
+        lines += (pairs / name).read_text().replace("left/frame", f"both/{part}").splitlines()[bool(part) :]
+    (pairs / "jump.csv").write_text("\n".join([*lines, ""]))
+    assert rollcli("rig", "jump.csv", "--correction", "jump.json", "-q", cwd=pairs).status == 0
+    assert columns(pairs / "jump.json") == columns(pairs / "use.json")
+
+
+def test_the_error_of_depth_is_the_same_at_each_size_that_pairs_are_matched_at(pairs):
+    given = ("--left", "left", "--right", "off", "--downscale", "2", "--calib", "calib.txt", "-q")
+    assert rollcli("estimate", *given, "-o", "half.csv", cwd=pairs).status == 0
+    sized = "cam0=[280 0 239.5; 0 280 179.5; 0 0 1]\nbaseline=540\nwidth=480\nheight=360\n"
+    (pairs / "sized.txt").write_text(sized)
+    errors = []
+    for result in ("off.csv", "half.csv"):
+        for calibration in ("sized.txt", "calib.txt"):
+            asked = (result, "--calib", calibration, "--format", "json", "-q")
+            found = json.loads(rollcli("rig", *asked, cwd=pairs).out)
+            errors.append(found["alignment"]["depth_error_percent"]["10_m"])
+    assert errors == pytest.approx([errors[0]] * 4, rel=0.1)
+    assert rollcli("report", "half.csv", "-o", "half.html", "--gallery", "0", cwd=pairs).status == 0
+    assert f"{errors[-1]:.1f} % at 10 m" in (pairs / "half.html").read_text()
 
 
 def test_with_a_correction_the_angles_are_those_of_the_untouched_pairs(pairs):

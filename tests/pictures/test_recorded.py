@@ -99,6 +99,7 @@ def _roads():
     full |= {"alpha0": 1.0, "alpha1": 0.3, "alpha2": 1e-3}
     lacking = [
         {},
+        {"image_roll_deg": 4.5},
         *({name: None} for name in ("pitch_deg", "camber", "roll_deg", "width", "height", "alpha1")),
     ]
     rows = [Row("a.png", status="ok", **full | each) for each in lacking]
@@ -230,6 +231,7 @@ CASES = {
             made(derotate, np.ones((2, 2)), *angles)
             for angles in ((), (3.14,), (3.15,), (-3.2,), (math.nan,))
         ),
+        *(made(derotate, np.ones((2, 2)), roll_deg=angle) for angle in (180, -181)),
         *(
             made(derotate, np.ones(shape, kind), 0.1)
             for shape, kind in ((4, "f8"), ((2, 2, 2), "f8"), ((2, 2), "c8"))

@@ -210,13 +210,18 @@ def test_a_page_to_a_device_or_pipe_goes_into_it_and_leaves_it_there(folder):
 
 
 @pytest.mark.slow
-def test_heights_are_shown_as_estimate_drew_them_or_made_in_the_same_colours(tmp_path):
-    v = np.mgrid[:120, :160][0]
-    road = np.maximum(0.4 * (v - 20), 0).astype(np.float32)
+@pytest.mark.parametrize("encoding", ["px", "depth"])
+def test_heights_are_shown_as_estimate_drew_them_or_made_in_the_same_colours(tmp_path, encoding):
+    v, u = np.mgrid[:120, :160]
+    road = np.maximum(0.4 * (v - 30) + 0.1 * (u - 80), 0).astype(np.float32)
     road[80:90, 60:100] += 1.0
     (tmp_path / "maps").mkdir()
-    np.save(tmp_path / "maps" / "a.npy", road)
-    rig = ("--focal", "200", "--principal-point", "79.5,20", "--baseline", "0.5")
+    with np.errstate(divide="ignore"):
+        np.save(tmp_path / "maps" / "a.npy", road if encoding == "px" else 200 * 0.5 / (road + 5))
+    # unequal focal lengths and doffs count, too
+    cameras = "cam0=[200 0 79.5; 0 300 20; 0 0 1]\ncam1=[200 0 84.5; 0 300 20; 0 0 1]\nbaseline=500\n"
+    (tmp_path / "calib.txt").write_text(cameras)
+    rig = ("--calib", "calib.txt", "--encoding", encoding)
     rollcli(
         "estimate", "maps", "-o", "rolls.csv", *rig, "--heights-preview", "out/heights_preview", cwd=tmp_path
     )

@@ -217,6 +217,7 @@ DAMAGED = (
     files.driving_stereo(PLAIN).replace("P_rect_103", "P_rect_104"),
     files.orb_slam(PLAIN).replace("fx: 707.0912", "fx: 0"),
     files.opencv_yaml(PLAIN._replace(baseline=-0.5)).partition("Q:")[0],
+    files.opencv_yaml(PLAIN._replace(baseline=-0.5)),
 )
 YAMLS = [*_texts("yaml"), "a: " + "[" * 9_000, "a: [" + "1," * 80_000 + "]"]
 
@@ -244,6 +245,7 @@ def _posed(name, calibration):
 POSES = {
     "square": Calibration(200.0, 200.0, 119.5, 79.5, 0.5),
     "no baseline": Calibration(200.0, 200.0, 119.5, 79.5),
+    "millimetres": Calibration(200.0, 200.0, 119.5, 79.5, 500.0),
     "not square": Calibration(190.0, 215.0, 100.0, 90.0, 0.2, doffs=2.0),
     "at the edge": Calibration(200.0, 205.0, 12.0, 8.0, 0.5),
     "at the other edge": Calibration(200.0, 205.0, 225.0, 150.0, 0.5),

@@ -5,6 +5,7 @@ import numpy as np
 from rollcli.rig.drive.assess import DriveAssessment, RigAssessment, RigFrames
 from rollcli.rig.drive.posterior import Estimate, Series
 from rollcli.rig.drive.quantity import Jump, Segment, SequenceAssessment
+from rollcli.rig.quantities import SIZE
 
 UNKNOWN = Estimate()
 
@@ -59,7 +60,7 @@ def rig(*drives, changes=None, ok=None, suspect=None, include_suspect=False):
     suspect = np.zeros(total, dtype=bool) if suspect is None else np.asarray(suspect)
     rolls = [quantities["roll"] for _, quantities in drives]
     return RigAssessment(
-        RigFrames(files, ok, suspect, {}),
+        RigFrames(files, ok, suspect, {name: np.full(total, 256.0) for name in SIZE}),
         sum(each.used for each in rolls),
         int(suspect.sum()),
         int((~ok & ~suspect).sum()),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rollcli.errors import RollcliError
+from rollcli.rig.quantities import ALIGNMENT
 from rollcli.run.options import GateOptions
 from rollcli.run.rig_gates import Check, check_options, run_checks, status_of
 from rollcli.run.rig_text import Findings, as_csv, as_json, as_table
@@ -44,6 +45,15 @@ def _drifted():
     roll = sequence(100, known(0.5, 0.1), drift=known(1.0, 0.1), drifts=True)
     ends = replace(roll.segments[0], begin=known(0.0, 0.1), end=known(1.0, 0.1))
     return rig(("a", {"roll": replace(roll, segments=(ends,))}))
+
+
+def _pairs(first, last):
+    """A drive whose right view drifts from one height to another."""
+    lower = sequence(100, known((first + last) / 2, 0.125), drifts=first != last)
+    ends = replace(lower.segments[0], begin=known(first, 0.125), end=known(last, 0.125))
+    still = {each.name: sequence(100, known(0.0, 0.0)) for each in ALIGNMENT[1:]}
+    parts = {ALIGNMENT[0].name: replace(lower, segments=(ends,)), **still}
+    return "p", {"roll": sequence(100, known(0.0, 0.1)), **parts}
 
 
 def _posed():
@@ -110,6 +120,11 @@ GATES = {
     **{f"share {least}": (_doubted, {"min_ok": least}) for least in (0.75, 0.7501, 0.0, 1.0)},
     "all": (STILL, {"expect_roll": 0.0, "within": 1.0, "max_drift": 1.0, "max_jump": 1.0, "min_ok": 1.0}),
     "pairs": (STILL, {"max_misalignment": 1.0}),
+    **{
+        f"pairs, {first} to {last}": (partial(rig, _pairs(first, last)), {"max_misalignment": 1.0})
+        for first, last in ((2.0, 0.0), (0.5, 0.5), (0.0, 1.0), (0.0, 0.875))
+    },
+    "pairs off in one drive": (partial(rig, _pairs(2.0, 2.0), _pairs(0.0, 0.0)), {"max_misalignment": 1.0}),
 }
 WRONG = (
     *({"expect_roll": 0.0}, {"expect_pitch": 0.0}, {"expect_pitch": 0.0, "within_height": 1.0}),

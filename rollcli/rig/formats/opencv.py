@@ -11,12 +11,12 @@ from collections.abc import Sequence
 from xml.etree import ElementTree
 
 from rollcli.errors import InputError
+from rollcli.rig.calibration import LIKELY_BASELINE
 from rollcli.rig.formats.fields import Fields, File, Projection, json_values, numbers, pair_of, swapped
 from rollcli.rig.formats.yaml import Value, parse_yaml
 
 _KEYS = re.compile(r"""(?:^|[\s<{,"])(?:P1|P2|Q|M1)(?:"?\s*:|[\s>])""")
 _MARKS = ("%YAML:1.0", "%YAML 1.0", "<opencv_storage>", "opencv-matrix")
-_METRES = (0.005, 5.0)  # no rig on a vehicle is smaller or larger: another number has another unit
 _SAME = 1e-3  # relative: P2 and Q are of one rig
 
 
@@ -38,6 +38,8 @@ def read_opencv(file: File) -> Fields:
             f"{file.name}: has no P1 and P2, and no Q: give the file with stereoRectify's results "
             "(often extrinsics.yml); camera matrices alone are those of the raw images"
         )
+    if found[4] < 0:
+        raise swapped(file.name)
     if "P1" in matrices and "Q" in matrices:
         both = [(fx, cx, cy, length) for fx, _, cx, cy, length, _ in (found, _of_q(file, matrices["Q"]))]
         if any(abs(one - two) > _SAME * abs(one) for one, two in zip(*both, strict=True)):
@@ -52,9 +54,7 @@ def read_opencv(file: File) -> Fields:
 def _with_unit(file: File, found: tuple[float, float, float, float, float, float]) -> Fields:
     """Take the length for metres where it can be metres."""
     fx, fy, cx, cy, length, doffs = found
-    if length < 0:
-        raise swapped(file.name)
-    low, high = _METRES
+    low, high = LIKELY_BASELINE
     if not low <= length <= high:
         lacks = (
             f"has a baseline of {length:g} in the unit of its chessboard's squares, which cannot be metres"
