@@ -253,7 +253,8 @@ class Manifest:
         with reading(self._path, _LIST, UsageError), Path(self._path).open("rb") as file:
             file.seek(offset)
             for number, line in enumerate(file, 1):
-                if name := line.rstrip(b"\r\n").removeprefix(codecs.BOM_UTF8):
+                text = line if offset else line.removeprefix(codecs.BOM_UTF8)
+                if name := text.rstrip(b"\r\n"):
                     if places is not None and count % _BLOCK == 0:
                         places.append(offset)
                     count += 1

@@ -40,6 +40,12 @@ def test_any_run_of_names_is_read_from_its_place(names, part):
     assert list(manifest.names(range(1000)[part])) == every[part]
 
 
+def test_a_byte_order_mark_is_one_at_the_start_of_the_file_alone(tmp_path):
+    path = tmp_path / "names.txt"
+    path.write_text("\ufeffa.png\nb.png\n\ufeffc.png\n", "utf-8")
+    assert list(Manifest(path).names(range(3))) == ["a.png", "b.png", "\ufeffc.png"]
+
+
 @pytest.fixture
 def maps(tmp_path):
     write_maps(tmp_path / "maps", 12)
