@@ -7,7 +7,7 @@ import sqlite3
 import cv2
 import pytest
 
-from tests.files.recordings.bag_files import camera_info, image, write_bag
+from tests.files.recordings.bag_files import camera_info, compressed, image, write_bag
 from tests.files.recordings.small_bags import mcap
 from tests.files.recordings.test_bags import START, STEP, P, drive, maps, rows
 from tests.run_cli import rollcli, write_pair
@@ -56,6 +56,16 @@ def test_without_the_extra_a_line_says_what_to_install(tmp_path):
 def test_a_topic_without_messages_is_refused_with_a_line(tmp_path):
     (tmp_path / "drive.mcap").write_bytes(mcap(data=()))
     assert "drive.mcap: has no messages of /a" in refused(tmp_path, "drive.mcap", "--topic", "/a")
+
+
+def test_frames_of_a_video_in_a_bag_say_what_to_do(tmp_path):
+    def make(store):
+        yield "/a", START, compressed(store, b"\0\0\0\1\x67" + bytes(20), "h264", START)
+
+    path = write_bag(tmp_path, "drive", "mcap", make).name
+    done = rollcli("estimate", path, "--topic", "/a", cwd=tmp_path)
+    assert done.status == 3
+    assert "export the topic as .mp4, and read the video" in done.out + done.err
 
 
 def test_the_first_messages_may_be_damaged(tmp_path):
