@@ -23,6 +23,8 @@ DISPARITY, IMAGE, COMPRESSED = (
     "sensor_msgs/CompressedImage",
 )
 CAMERA_INFO = "sensor_msgs/CameraInfo"
+_VIDEO_STARTS = (b"\0\0\1", b"\0\0\0\1")  # start codes of H.264 and H.265 [ITU-T H.264, annex B]
+_AS_VIDEO = "export the topic as .mp4, and read the video"
 MAP_ENCODINGS = ("mono16", "16UC1", "16SC1", "32FC1")  # of images that hold disparities or depths
 # numpy's dtype, and the channels
 _PIXELS = {
@@ -92,7 +94,7 @@ def check_decoder(topic: Topic, name: str) -> None:
     InputError
     """
     if topic.type not in (DISPARITY, IMAGE, COMPRESSED):
-        hint = ": export the topic as .mp4, and read the video" if "Video" in topic.type else ""
+        hint = f": {_AS_VIDEO}" if "Video" in topic.type else ""
         kind = topic.type or "unknown"
         raise InputError(f"{name}: {topic.name} has messages of the type {kind}, not images of ROS{hint}")
     if topic.encoding not in ("cdr", "ros1"):
@@ -112,9 +114,6 @@ def camera_info(topic: Topic, data: memoryview, name: str) -> CameraInfo:
 def image_encoding(topic: Topic, data: memoryview, name: str) -> str:
     """Return what the pixels of an Image are; empty for other types."""
     return str(_decoded(topic, data, name).encoding) if topic.type == IMAGE else ""
-
-
-_VIDEO_STARTS = (b"\0\0\1", b"\0\0\0\1")  # start codes of H.264 and H.265 [ITU-T H.264, annex B]
 
 
 def baseline_of(topic: Topic, data: memoryview, name: str) -> float:
@@ -150,8 +149,7 @@ def content_of(
         packed = bytes(found.data)
         if packed.startswith(_VIDEO_STARTS):
             raise InputError(
-                f"{name}: is a frame of a video (H.264 or H.265), which needs those before it: export the "
-                "topic as .mp4, and read the video"
+                f"{name}: is a frame of a video (H.264 or H.265), which needs those before it: {_AS_VIDEO}"
             )
         if "compressedDepth" in str(found.format):
             packed = packed[max(packed.find(png.SIGNATURE), 0) :]
