@@ -58,9 +58,19 @@ def shrink(view: NDArray[Any], factor: float) -> View:
     if factor == 1:
         return view
     height, width = matched_shape(view.shape, factor)
-    if factor >= _HALVED_FROM and not (view.shape[0] % 2 or view.shape[1] % 2):
-        view = shrink(view, 2)
-    return cv2.resize(view, (width, height), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+    while factor == 2 or factor >= _HALVED_FROM:
+        view, factor = _halved(view), factor / 2
+    if factor > 1:
+        view = cv2.resize(view, (width, height), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+    return view[:height, :width]
+
+
+def _halved(view: NDArray[Any]) -> View:
+    """Return means of four pixels. An odd last row or column counts twice: else it takes ten times longer."""
+    height, width = view.shape
+    even = cv2.copyMakeBorder(view, 0, height % 2, 0, width % 2, cv2.BORDER_REPLICATE)
+    size = even.shape[1] // 2, even.shape[0] // 2
+    return cv2.resize(even, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
 
 
 def shrink_both(views: Views, factor: float) -> Views:

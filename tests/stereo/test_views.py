@@ -5,7 +5,14 @@ import numpy as np
 import pytest
 
 from rollcli.errors import InputError
-from rollcli.stereo.views import prepare_views, sampled, shrink, shrink_both, smoothed_at_pixels
+from rollcli.stereo.views import (
+    matched_shape,
+    prepare_views,
+    sampled,
+    shrink,
+    shrink_both,
+    smoothed_at_pixels,
+)
 
 
 def test_colours_are_weighted_as_the_eye_does():
@@ -53,6 +60,17 @@ def test_a_small_view_has_the_means_of_the_pixels_it_stands_for(factor):
     np.testing.assert_allclose(both[1], 255 - means, atol=0.51)
     np.testing.assert_array_equal(shrink(view, factor), both[0])
     assert shrink(view, 1) is view
+
+
+@pytest.mark.parametrize("factor", [2, 4])
+@pytest.mark.parametrize("shape", [(375, 1242), (376, 1241), (373, 1243)])
+def test_rows_of_an_odd_view_lie_at_even_distances(factor, shape):
+    lowest = np.clip(np.indices(shape)[0] - shape[0] + 256, 0, 255).astype(np.uint8)  # a grey level a row
+    small = shrink(lowest, factor)
+
+    assert small.shape == matched_shape(shape, factor)
+    seen = np.indices(small.shape)[0] * factor + (factor - 1) / 2 - shape[0] + 256
+    np.testing.assert_allclose(small[-50:-1], seen[-50:-1], atol=0.6)  # the last row may stand for fewer
 
 
 @pytest.mark.parametrize(
