@@ -162,11 +162,11 @@ class Search:
             return self._named(argument, frame_name(path.name) if "#" in argument else path.name)
         return self._wanted(argument, self._in_pattern(argument), "pattern")
 
-    def allows(self, location: str) -> bool:
+    def allows(self, location: str, *, found: bool = False) -> bool:
         """Tell whether --include and --exclude allow a file.
 
-        A glob with a slash is matched against its path, below the folder or pattern it was found in or as it
-        was named; any other against its name alone.
+        A glob is matched against its name, and against its path: below the folder or pattern that it was
+        found in; of a file that was named, where the glob has a slash.
         """
         if not (self.include or self.exclude):
             return True
@@ -174,7 +174,10 @@ class Search:
         name = base_name(frame_name(path))
 
         def fits(globs: Sequence[str]) -> bool:
-            return any(fnmatch.fnmatchcase(path if "/" in each else name, each) for each in globs)
+            paths = [each for each in globs if found or "/" in each]
+            return any(fnmatch.fnmatchcase(name, each) for each in globs) or any(
+                fnmatch.fnmatchcase(path, each) for each in paths
+            )
 
         return (not self.include or fits(self.include)) and not fits(self.exclude)
 
@@ -187,7 +190,7 @@ class Search:
         """Yield the files that --include and --exclude allow; finding none is an error."""
         found = list(itertools.islice(files, 1))
         every = itertools.chain(found, files)
-        wanted: Iterator[tuple[str, str]] = (each for each in every if self.allows(each[1]))
+        wanted: Iterator[tuple[str, str]] = (each for each in every if self.allows(each[1], found=True))
         if self.maps and kind != "pattern":
             wanted = _without_views(argument.rstrip("/"), wanted)
         first = next(wanted, None)
