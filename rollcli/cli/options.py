@@ -65,7 +65,7 @@ def _stereo(
 
 _folders = (
     option("--recursive", FLAG, "Search folders recursively."),
-    option("--include", Text("GLOB"), "Of folders, take only files that match. Repeatable.", multiple=True),
+    option("--include", Text("GLOB"), "Take only files that match. Repeatable.", multiple=True),
     option("--exclude", Text("GLOB"), "Leave out files that match. Repeatable.", multiple=True),
     option("--every", Number("N", at_least=1, whole=True), "Take every N-th frame of what is found."),
 )

@@ -13,7 +13,7 @@ from rollcli.errors import UsageError, as_usage, reading
 from rollcli.files.bounded import MOST_LISTED, as_utf8, read_given, read_stream
 from rollcli.files.containers import file_of, shown
 from rollcli.files.naming import Input, listed, match_names, natural_key
-from rollcli.files.search import IMAGE_ENDINGS, Search
+from rollcli.files.search import IMAGE_ENDINGS, LEAVE_NONE, Search
 from rollcli.files.storage import read_bytes
 from rollcli.files.stores.locations import base_name, is_url, public_name
 
@@ -55,6 +55,7 @@ def find_inputs(
     found: list[Input] = []
     seen: dict[str, set[str]] = {}  # names by their folders, whose texts they share
     real = functools.cache(os.path.realpath)  # one folder holds thousands of files
+    argument = ""
     for argument, literal in _arguments(inputs, files_from):
         before, repeats = len(found), False
         for path, relative in search.files(argument, literal=literal):
@@ -80,7 +81,8 @@ def find_inputs(
     del seen  # before the keys of the sort take its place
     if not any(is_url(each.location) or os.path.lexists(file_of(each.location)) for each in found):
         named = listed(each.name for each in found)
-        raise UsageError(f"no input found: {named + ': no such file' if named else 'the list is empty'}")
+        empty = f"{LEAVE_NONE} of the named files" if argument else "the list is empty"
+        raise UsageError(f"no input found: {named + ': no such file' if named else empty}")
     found.sort(key=lambda each: natural_key(each.name))
     return found
 

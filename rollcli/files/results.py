@@ -20,6 +20,7 @@ from rollcli.files.bounded import as_utf8, read_given, read_stream
 from rollcli.files.storage import list_names, read_bytes
 from rollcli.files.stores.locations import is_url, is_web_url, public_name
 from rollcli.files.stores.objects import NO_OBJECT
+from rollcli.rig.quantities import BOUNDS
 
 MAGIC = b"PAR1"
 _ROWS_AT_ONCE = 1000
@@ -468,14 +469,6 @@ def read_named(path: str | Path) -> bytes:
         return read_stream(sys.stdin.buffer, STDIN) if str(path) == STDIN else read_given(path)
 
 
-# what lies outside is another program's idea of a roll
-_BOUNDS = {
-    "roll_deg": (-90.0, 90.0),
-    "image_roll_deg": (-90.0, 90.0),
-    "roll_ci95_deg": (0.0, math.inf),
-    "pitch_deg": (-90.0, 90.0),
-    "height_m": (0.0, math.inf),
-}
 _MOST = 1e40  # more than any float32 of a map; of what is larger squares cannot be summed
 
 
@@ -533,7 +526,7 @@ def _number(kind: type, low: float, high: float, value: Any) -> Any:
 
 def _reader(name: str, kind: type) -> Callable[[Any], Any]:
     if kind in (int, float):
-        return partial(_number, kind, *_BOUNDS.get(name, (-math.inf, math.inf)))
+        return partial(_number, kind, *BOUNDS.get(name, (-math.inf, math.inf)))
     return {"file": _file, "status": _status}.get(name, _flag if kind is bool else _words)
 
 

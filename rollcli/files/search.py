@@ -21,6 +21,7 @@ from rollcli.files.stores.locations import (
     base_name,
     is_object_url,
     is_url,
+    public_name,
     scheme_of,
     split_url,
 )
@@ -30,6 +31,7 @@ MAP_ENDINGS = (".png", ".tif", ".tiff", ".npy", ".npz", ".pfm", ".exr")
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm")
 _OTHER_ENDINGS = (".csv", ".jsonl", ".parquet", ".txt", ".json", ".yaml", ".yml", ".xml", ".toml")
 _OF_FILES = {*MAP_ENDINGS, *IMAGE_ENDINGS, *_OTHER_ENDINGS}
+LEAVE_NONE = "--include and --exclude leave none"
 _MAGIC = re.compile(r"[*?[]")
 
 
@@ -107,7 +109,7 @@ class Search:
     recursive : bool
         Search folders recursively.
     include, exclude : sequence of str
-        Globs on the names or relative paths of what folders and patterns hold.
+        Globs, see `allows`.
     skip : sequence of path
         Folders that are never searched: results go there.
     maps : bool
@@ -157,27 +159,47 @@ class Search:
             refuse_packed(argument)
             if is_archive(argument) and is_file(path):
                 return self._wanted(argument, self._in_archive(argument), "archive")
-            return iter([(argument, frame_name(path.name) if "#" in argument else path.name)])
+            return self._named(argument, frame_name(path.name) if "#" in argument else path.name)
         return self._wanted(argument, self._in_pattern(argument), "pattern")
+
+    def allows(self, location: str, *, found: bool = False) -> bool:
+        """Tell whether --include and --exclude allow a file.
+
+        A glob is matched against its name, and against its path: below the folder or pattern that it was
+        found in; of a file that was named, where the glob has a slash.
+        """
+        if not (self.include or self.exclude):
+            return True
+        path = public_name(location).replace(os.sep, "/").removeprefix("./")
+        name = base_name(frame_name(path))
+
+        def fits(globs: Sequence[str]) -> bool:
+            paths = [each for each in globs if found or "/" in each]
+            return any(fnmatch.fnmatchcase(name, each) for each in globs) or any(
+                fnmatch.fnmatchcase(path, each) for each in paths
+            )
+
+        return (not self.include or fits(self.include)) and not fits(self.exclude)
+
+    def _named(self, location: str, name: str) -> Iterator[tuple[str, str]]:
+        return iter([(location, name)] if self.allows(location) else [])
 
     def _wanted(
         self, argument: str, files: Iterator[tuple[str, str]], kind: str
     ) -> Iterator[tuple[str, str]]:
         """Yield the files that --include and --exclude allow; finding none is an error."""
-        wanted: Iterator[tuple[str, str]] = filter(self._allows, files)
+        found = list(itertools.islice(files, 1))
+        every = itertools.chain(found, files)
+        wanted: Iterator[tuple[str, str]] = (each for each in every if self.allows(each[1], found=True))
         if self.maps and kind != "pattern":
             wanted = _without_views(argument.rstrip("/"), wanted)
         first = next(wanted, None)
         if first is None:
             hint = self._in_place_of_inputs(argument) if kind == "folder" else ""
+            hint = f"; {LEAVE_NONE}" if found else hint
             raise UsageError(f"{argument}: no input found in this {kind} ({' '.join(self.endings)}){hint}")
         yield first
         yield from wanted
-
-    def _allows(self, file: tuple[str, str]) -> bool:
-        names = (file[1], posixpath.basename(file[1]))
-        included = not self.include or _match(names, self.include)
-        return included and not _match(names, self.exclude)
 
     def _in_place_of_inputs(self, folder: str) -> str:
         """Say what a folder without inputs holds instead."""
@@ -257,7 +279,7 @@ class Search:
         """Yield the objects behind a URL: one, or those of a prefix or pattern that are readable."""
         pattern = not literal and is_object_url(url) and glob.has_magic(url)
         if not pattern and (literal or not is_folder_url(url)):
-            return iter([(url, base_name(url))])
+            return self._named(url, base_name(url))
         found = objects_behind(url, recursive=self.recursive)
         wanted = (each for each in found if not each[0].startswith(self._skipped_urls))
         readable = ((each, below) for each, below in wanted if self._reads(each))
@@ -298,10 +320,6 @@ def _as_pairs(left: str, right: str) -> str:
     """Say what to type for pairs; they are not taken as such, since scripts should say which they mean."""
     command = shlex.join(["--left", left, "--right", right])
     return f"it holds the left and right views of pairs: give {command}; or name its maps alone"
-
-
-def _match(names: tuple[str, str], patterns: Sequence[str]) -> bool:
-    return any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns for name in names)
 
 
 def _matches(pattern: str) -> Iterator[str]:

@@ -1,5 +1,6 @@
 """What is assessed of a rig: roll, pitch and height, with their columns and units. Import-light."""
 
+import math
 from dataclasses import dataclass
 
 
@@ -41,4 +42,12 @@ ALIGNMENT = (
     Quantity("right_twist", "right_twist_px", "", " px", "px", 0.2),
 )
 SIZE = ("width", "height")
+# of columns; what lies outside is another program's idea of a roll
+BOUNDS = {
+    "roll_deg": (-90.0, 90.0),
+    "image_roll_deg": (-90.0, 90.0),
+    "roll_ci95_deg": (0.0, math.inf),
+    "pitch_deg": (-90.0, 90.0),
+    "height_m": (0.0, math.inf),
+}
 COLUMNS = tuple(name for each in (*QUANTITIES, *ALIGNMENT) for name in (each.column, each.ci_column) if name)

@@ -13,7 +13,7 @@ from rollcli.files.atomic import is_file
 from rollcli.files.containers import BAGS, VIDEOS, bag_files, file_of, frame_name, is_video
 from rollcli.files.inputs import Manifest, find_inputs, named_input, pair_inputs
 from rollcli.files.naming import Input
-from rollcli.files.search import IMAGE_ENDINGS, MAP_ENDINGS, Search, is_place, objects_behind
+from rollcli.files.search import IMAGE_ENDINGS, LEAVE_NONE, MAP_ENDINGS, Search, is_place, objects_behind
 from rollcli.files.storage import fetch_all, read_bytes
 from rollcli.files.stores.locations import is_url, names_a_file, public_name
 from rollcli.messages import say
@@ -271,6 +271,8 @@ def _sorted_frames(named: Named) -> "SortedFrames":
     given = named.inputs
     if given.inputs or given.files_from is None or given.files_from == "-" or is_url(given.files_from):
         raise UsageError("--sorted takes the names of one file on disk: give --files-from FILE and no input")
+    if given.recursive or given.include or given.exclude:
+        raise UsageError("--sorted takes the names as they are: leave out --recursive, --include, --exclude")
     manifest = Manifest(given.files_from)
     places = range(0, len(manifest), given.every)
     return SortedFrames(manifest, _FrameMaker(named), places)
@@ -376,7 +378,7 @@ def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
     Raises
     ------
     UsageError
-        Some are, or one is in a store, or the extra is missing.
+        Some are, or one is in a store, or --include and --exclude leave none, or the extra is missing.
     """
     bags = []
     for name in dict.fromkeys(given.inputs):
@@ -388,7 +390,11 @@ def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
         raise UsageError(f"{bags[0][0]}: is a bag: give bags and other inputs in runs of their own")
     if bags:
         require_extra("bags", bags[0][0])
-    return bags
+    search = Search(include=given.include, exclude=given.exclude)
+    allowed = [each for each in bags if search.allows(each[0].rstrip("/"))]
+    if bags and not allowed:
+        raise UsageError(f"no input found: {LEAVE_NONE} of the named bags")
+    return allowed
 
 
 def _bag_frames(bags: "Iterable[BagFrames]", make: "_FrameMaker") -> list[Frame]:

@@ -252,6 +252,11 @@ class TaskProgress:
         """Name what else is shown beside the number of frames."""
         return {}
 
+    def frames(self) -> str:
+        """Say how many frames are done, and how many of them were kept."""
+        kept = f" ({self.kept} kept)" if self.kept else ""
+        return f"{self.done} frame{'' if self.done == 1 else 's'}{kept}"
+
     def speed(self) -> str:
         """Say how many frames were done in a second, those of an interrupted run left out."""
         return f"{self._finished / max(self.seconds, 1e-9):.1f} frames/s"
@@ -411,10 +416,8 @@ class Progress(TaskProgress):
             for line in self._failures.repeated():
                 self.say(line)
         counts = self.summary.counts
-        kept = f" ({self.kept} kept)" if self.kept else ""
         by_status = [f"{counts[status]} {status}" for status in self._statuses]
         by_status.append(f"{counts['error']} failed")
-        frames = f"{self.done} frame{'' if self.done == 1 else 's'}{kept}"
-        self.note(f"{frames}: {', '.join(by_status)}; {self.seconds:.1f} s, {self.speed()}")
+        self.note(f"{self.frames()}: {', '.join(by_status)}; {self.seconds:.1f} s, {self.speed()}")
         if advice := self.summary.advice:
             self.note(f"median over the pairs: {advice}")

@@ -364,7 +364,7 @@ def run_simulate(
     if progress.done < progress.total:
         say(f"interrupted after {progress.done} of {progress.total} frames; continue with: {resume_command}")
         return ExitStatus.INTERRUPTED
-    kept, rendered = f" ({progress.kept} kept)" if progress.kept else "", progress.done - progress.kept
+    rendered = progress.done - progress.kept
     cost = f", {progress.seconds / rendered:.2f} s a frame" if rendered else ""
-    progress.note(f"{progress.done} frames{kept} in {dataset.folder}; {progress.seconds:.1f} s{cost}")
+    progress.note(f"{progress.frames()} in {dataset.folder}; {progress.seconds:.1f} s{cost}")
     return ExitStatus.DONE

@@ -55,23 +55,34 @@ def test_one_rig_written_in_every_format_is_one_calibration(form, rig):
     assert (found.width, found.height) == size
 
 
-@pytest.mark.parametrize("ending", ["yml", "xml", "json"])
-def test_what_opencv_itself_writes_is_read(tmp_path, ending):
-    path = tmp_path / f"extrinsics.{ending}"
-    turn = np.eye(3)
-    shift = np.array([[-RIG.baseline], [0.001], [-0.002]])
-    camera = np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])
-    none = np.zeros(5)
-    *_, p1, p2, q, _, _ = cv2.stereoRectify(camera, none, camera, none, (640, 480), turn, shift)
+CAMERAS = [np.array([[500.0, 0, cx], [0, 500, 240], [0, 0, 1]]) for cx in (320, 330)]
+
+
+def rectified(path, shift, names):
+    """The results of stereoRectify, and the text of a file that has those of these names."""
+    found = {"R": np.eye(3), "T": shift}
+    left, right = CAMERAS
+    found["R1"], found["R2"], found["P1"], found["P2"], found["Q"], *_ = cv2.stereoRectify(
+        left, np.zeros(5), right, np.zeros(5), (640, 480), found["R"], shift, flags=0
+    )
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
-    for name, matrix in (("R", turn), ("T", shift), ("P1", p1), ("P2", p2), ("Q", q)):
-        storage.write(name, matrix)
+    for name in names:
+        storage.write(name, found[name])
     storage.release()
-    found = parse(path.read_text())
+    return found, path.read_text()
+
+
+@pytest.mark.parametrize("ending", ["yml", "xml", "json"])
+@pytest.mark.parametrize("names", [("R", "T", "P1", "P2", "Q"), ("P1", "P2"), ("Q",)], ids="-".join)
+def test_what_opencv_itself_writes_is_read_and_swapped_cameras_are_told(tmp_path, names, ending):
+    path, shift = tmp_path / f"extrinsics.{ending}", np.array([[-RIG.baseline], [0.001], [-0.002]])
+    results, text = rectified(path, shift, names)
+    found, p1, p2 = parse(text), results["P1"], results["P2"]
     # the rectified rows run along the baseline, whose length rectification keeps
     expected = [p1[0, 0], p1[1, 1], p1[0, 2], p1[1, 2], np.linalg.norm(shift), p2[0, 2] - p1[0, 2]]
     assert numbers(found) == pytest.approx(expected, rel=1e-9, abs=1e-9)
     assert "taken for metres" in found.notes[0]
+    assert "its right camera stands left of its left one" in refusal(rectified(path, -shift, names)[1])
 
 
 def test_bytes_that_are_no_text_and_large_files_are_refused():

@@ -82,20 +82,29 @@ def _inflated(packed: bytes, most: int) -> bytes:
 def _unpacked_by_opencv(compression: int, packed: bytes, rows: int, row: int) -> bytes:
     """Undo LZW or PackBits; imagecodecs' decoder for LZW crashes on damaged data."""
     # OpenCV refuses data that end too early in pictures of 16 bits alone: two bytes, or two rows, are a pixel
-    width, height = (row, rows // 2) if row % 2 and rows > 1 else (row // 2, rows)
-    pixels = _decoded_picture(compression, packed, 16, width, height)
-    if pixels is not None and rows * row % 2:  # of an odd number of bytes
-        pixels = _decoded_picture(compression, packed, 8, row, rows)
+    odd = rows * row % 2
+    if odd:  # a further row, of zeros, comes first
+        packed = _packed_zero(compression, packed) * row + packed
+    width, height = (row, (rows + odd) // 2) if row % 2 else (row // 2, rows)
+    pixels = _decoded_picture(compression, packed, width, height)
     if pixels is None:
         raise DamagedPartError(f"they are not {rows * row} bytes")
-    return pixels.astype(f"<u{pixels.itemsize}", copy=False).tobytes()
+    return pixels.astype("<u2", copy=False).tobytes()[odd * row :]
 
 
-def _decoded_picture(
-    compression: int, packed: bytes, bits: int, width: int, height: int
-) -> NDArray[Any] | None:
-    """Return the pixels of a grey TIFF of one strip; None where OpenCV refuses it."""
-    numbers = width, height, bits, compression, 1, 8 + 2 + 12 * len(_TAGS) + 4, height, len(packed)
+def _packed_zero(compression: int, packed: bytes) -> bytes:
+    """Pack one byte, 0, to stand before packed data."""
+    if compression == _PACKBITS:
+        return b"\0\0"  # a run of one
+    # 8 codes of 9 bits: the 0, and on both sides of it 256, which clears the table. Data of old LZW begin so,
+    # and have their lowest bits first [libtiff]
+    old = len(packed) > 1 and packed[0] == 0 and packed[1] % 2
+    return sum(256 << 9 * place for place in range(8) if place != 1).to_bytes(9, "little" if old else "big")
+
+
+def _decoded_picture(compression: int, packed: bytes, width: int, height: int) -> NDArray[Any] | None:
+    """Return the pixels of 16 bits of a grey TIFF of one strip; None where OpenCV refuses it."""
+    numbers = width, height, 16, compression, 1, 8 + 2 + 12 * len(_TAGS) + 4, height, len(packed)
     entries = [struct.pack("<HHII", tag, 4, 1, number) for tag, number in zip(_TAGS, numbers, strict=True)]
     file = struct.pack("<4sIH", b"II*\0", 8, len(_TAGS)) + b"".join(entries) + bytes(4) + packed
     try:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rollcli.errors import UsageError
 from rollcli.rig.drive.posterior import Estimate, Flags, Floats
 from rollcli.rig.drive.quantity import SequenceAssessment, assess_sequence
-from rollcli.rig.quantities import ALIGNMENT, COLUMNS, QUANTITIES, ROLL, SIZE, Quantity
+from rollcli.rig.quantities import ALIGNMENT, BOUNDS, COLUMNS, QUANTITIES, ROLL, SIZE, Quantity
 
 AUTO, NONE = "auto", "none"
 _FRAMES_OF_A_DRIVE = 8  # folders of fewer frames on average are not drives but single frames
@@ -275,7 +275,7 @@ def assess_rig(
     Raises
     ------
     UsageError
-        A column is missing, or columns differ in length.
+        A column is missing, columns differ in length, or a value cannot be one of its column.
 
     Examples
     --------
@@ -403,6 +403,10 @@ def _frames(rows: Any) -> RigFrames:
     if "file" in rows:
         files = list(map(str, rows["file"]))
     numbers = {name: _floats(rows[name]) for name in (*COLUMNS, *SIZE) if name in rows}
+    for name, (low, high) in BOUNDS.items():
+        values = numbers.get(name, np.empty(0))
+        for value in values[(values < low) | (values > high)]:
+            raise UsageError(f"{value:g} is no value for {name}")
     if len({len(states), len(files), *map(len, numbers.values())}) > 1:
         raise UsageError("the columns differ in length")
     unknown = sorted(set(states.tolist()) - {"ok", "suspect", "error"})

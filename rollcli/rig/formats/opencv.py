@@ -67,7 +67,7 @@ def _with_unit(file: File, found: tuple[float, float, float, float, float, float
 def _of_q(file: File, q: Sequence[float]) -> tuple[float, float, float, float, float, float]:
     if len(q) != 16 or q[14] == 0:
         raise InputError(f"{file.name}: its Q is no matrix of a horizontal rig")
-    return q[11], q[11], -q[3], -q[7], 1 / abs(q[14]), q[15] / q[14]
+    return q[11], q[11], -q[3], -q[7], 1 / q[14], q[15] / q[14]
 
 
 def _matrices(file: File) -> dict[str, list[float]]:

@@ -257,10 +257,10 @@ class Chunk(Generic[Task, Result]):
         self._do, self._join, self._tasks = do, join, tasks
         self._stopped, self._longest_s = stopped, longest_s
         self._over = 0.0
-        self._error: Exception | None = None
-        self._attempts: Iterable[tuple[Result, ...]] = map(self._attempt, tasks)
+        self._errors: dict[int, Exception] = {}  # by the places of their tasks
+        self._attempts: Iterable[tuple[Result, ...]] = map(self._attempt, range(len(tasks)))
         if threads is not None:
-            futures = [threads.submit(self._attempt_in_turn, task) for task in tasks]
+            futures = [threads.submit(self._attempt_in_turn, place) for place in range(len(tasks))]
             self._attempts = (future.result() for future in futures)
 
     def done(self) -> Done[Result]:
@@ -269,25 +269,26 @@ class Chunk(Generic[Task, Result]):
         every = list(self._attempts)  # all of them: none goes on when the worker ends
         results = list(itertools.chain(*itertools.takewhile(len, every)))
         seconds = time.monotonic() - start  # what else a chunk costs does not grow with its tasks
+        error = self._errors.get(len(results))  # a later task may have failed before
         try:
-            return Done(self._join(self._tasks, results) if results else [], seconds, self._error)
+            return Done(self._join(self._tasks, results) if results else [], seconds, error)
         except Exception as failed:  # noqa: BLE001 (whoever asked for the results raises it)
             return Done([], seconds, _portable(failed))
 
-    def _attempt_in_turn(self, task: Task) -> tuple[Result, ...]:
+    def _attempt_in_turn(self, place: int) -> tuple[Result, ...]:
         with computing():
-            return self._attempt(task)
+            return self._attempt(place)
 
-    def _attempt(self, task: Task) -> tuple[Result, ...]:
+    def _attempt(self, place: int) -> tuple[Result, ...]:
         """Do a task, and return its result; nothing where it fails, or the chunk has ended before it."""
         now = time.monotonic()
         self._over = self._over or now + self._longest_s
-        if self._stopped.is_set() or self._error or now > self._over:
+        if self._stopped.is_set() or min(self._errors, default=place) < place or now > self._over:
             return ()
         try:
-            return (self._do(task),)
+            return (self._do(self._tasks[place]),)
         except Exception as error:  # noqa: BLE001 (whoever asked for the result raises it)
-            self._error = _portable(error)
+            self._errors[place] = _portable(error)
             return ()
 
 

@@ -1,12 +1,16 @@
 """The order of results, the sizes of chunks, halving and stops, with an executor in this process."""
 
+import itertools
 import random
 import threading
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from types import SimpleNamespace
 
 import pytest
 
+from rollcli.errors import InputError
 from rollcli.files.stores.locations import waiting_for_network
 from rollcli.run.workers import chunks as chunk_sizes
 from rollcli.run.workers.chunks import Chunk, Done, Work, Workers
@@ -227,3 +231,40 @@ def test_what_overtook_a_failed_task_is_no_result_of_its_chunk():
     with ThreadPoolExecutor(3) as threads:
         done = Chunk(fail, WORK.join, range(3), threading.Event(), WORK.longest_s, threads).done()
     assert (done.results, type(done.error)) == ([0], RuntimeError)
+
+
+class InOrder:
+    """Does what it is given once a result is asked for, in an order of its own."""
+
+    def __init__(self, order):
+        self.order, self.given = order, []
+
+    def submit(self, do, place):
+        self.given.append((do, place))
+        return SimpleNamespace(result=lambda: self.results()[place])
+
+    @cache  # noqa: B019
+    def results(self):
+        return {place: do(place) for do, place in (self.given[each] for each in self.order)}
+
+
+@pytest.mark.parametrize("order", list(itertools.permutations(range(4))))
+def test_of_several_failures_the_first_tasks_is_raised_whatever_the_order_of_the_threads(order):
+    def fail(task):
+        if task in "bd":
+            raise InputError(task)
+        return task
+
+    done = Chunk(fail, WORK.join, "abcd", threading.Event(), WORK.longest_s, InOrder(order)).done()
+    assert (done.results, str(done.error)) == (["a"], "b")
+
+
+def test_a_failure_is_not_raised_before_the_tasks_in_front_of_it_are_done():
+    stopped = threading.Event()
+
+    def stop_and_fail(task):
+        stopped.set()
+        raise InputError(task)
+
+    done = Chunk(stop_and_fail, WORK.join, "ab", stopped, WORK.longest_s, InOrder((1, 0))).done()
+    assert (done.results, done.error) == ([], None)
