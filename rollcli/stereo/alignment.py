@@ -110,11 +110,11 @@ class Texture(NamedTuple):
     @staticmethod
     def of(views: Views) -> "Texture":
         """Work it out; a pair that is measured again and again needs it once."""
-        # by half a pixel, beside what is smoothed for grey levels between pixels: more takes away the grain
-        # that tells on an empty road, less leaves the noise
-        left, right = map(smoothed, views)
-        left = smoothed(left)
-        return Texture(left, smoothed_between(right), *_gradients(left))
+        # no more than grey levels between pixels need: a vertical shift of real views depends on the grain
+        # that it is seen in, and the match sees all of it. Smoothed twice, 41 real pairs are off by -0.013
+        # degrees in place of -0.001 on average, and halved ones by -0.068 in place of -0.056
+        left = smoothed(views[0])
+        return Texture(left, smoothed_between(views[1].astype(np.float32)), *_gradients(left))
 
 
 def measure_misalignment(
@@ -171,7 +171,7 @@ def textured_share(view: View) -> float:
     """Return the share of a view's blocks that could tell a vertical disparity, were they matched."""
     if min(view.shape) < BLOCK:
         return 0.0
-    across, down = _gradients(smoothed(smoothed(view)))
+    across, down = _gradients(smoothed(view))
     along = block_means(across * across) + np.float32(_RIDGE)
     weight = block_means(down * down) - np.square(block_means(across * down)) / along
     return float(np.mean(weight > _LEAST))

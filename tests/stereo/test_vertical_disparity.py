@@ -118,7 +118,7 @@ def test_straight_edges_tell_only_where_they_lie_along_the_rows(slope, share):
     assert textured_share(edges.astype(np.uint8)) == pytest.approx(share, abs=0.05)
 
 
-@pytest.mark.parametrize(("scale", "offset"), [(0.002, 0.3), (0.0, 0.04)])
+@pytest.mark.parametrize(("scale", "offset"), [(0.002, 0.3), (0.0, 0.04), (0.0, 0.12), (0.0, 0.5)])
 def test_what_lies_between_pixels_is_measured_without_a_pull_to_whole_ones(scale, offset):
     rng = np.random.default_rng(3)
     waves = rng.uniform(-1.6, 1.6, (60, 2))  # rad/px: as fine as cameras resolve
@@ -138,7 +138,7 @@ def test_what_lies_between_pixels_is_measured_without_a_pull_to_whole_ones(scale
     views = seen(u, v), seen(level_x + 159.5 + shift, level_y + 119.5)
     found = measure_misalignment(Texture.of(views), np.full(u.shape, shift, np.float32), rounds=8)
     assert found.misalignment.scale == pytest.approx(scale, abs=5e-5)
-    assert found.misalignment.offset == pytest.approx(offset, abs=0.004)
+    assert found.misalignment.offset == pytest.approx(offset, abs=0.006)  # linearly 0.08
     assert found.misalignment.twist * 160 * 120 == pytest.approx(0, abs=0.006)
 
 
@@ -322,10 +322,10 @@ def test_smoothed_views_and_their_gradients_are_exact_so_every_opencv_has_the_sa
         return np.apply_along_axis(np.convolve, 0, wide, down[::-1], "valid")
 
     smooth, odd = np.array([1, 6, 1]), np.array([4, 4])
-    left, right = (filtered(filtered(view.astype(float), smooth, smooth), smooth, smooth) for view in views)
-    np.testing.assert_array_equal(found.left[2:-2, 2:-2] * 8.0**4, left)
-    np.testing.assert_array_equal(found.right[4:-4:2, 4:-4:2] * 8.0**4, right)
-    once = filtered(views[1].astype(float), smooth, smooth)
-    np.testing.assert_array_equal(found.right[3:-3:2, 3:-3:2] * 8.0**4, filtered(once, odd, odd))
-    np.testing.assert_array_equal(found.across[3:-3, 3:-3] * 8.0**5, filtered(left, [-1, 0, 1], [1, 2, 1]))
-    np.testing.assert_array_equal(found.down[3:-3, 3:-3] * 8.0**5, filtered(left, [1, 2, 1], [-1, 0, 1]))
+    left, right = (filtered(view.astype(float), smooth, smooth) for view in views)
+    between = filtered(views[1].astype(float), odd, odd)
+    np.testing.assert_array_equal(found.left[1:-1, 1:-1] * 8.0**2, left)
+    np.testing.assert_array_equal(found.right[2:-2:2, 2:-2:2] * 8.0**2, right)
+    np.testing.assert_array_equal(found.right[1:-1:2, 1:-1:2] * 8.0**2, between)
+    np.testing.assert_array_equal(found.across[2:-2, 2:-2] * 8.0**3, filtered(left, [-1, 0, 1], [1, 2, 1]))
+    np.testing.assert_array_equal(found.down[2:-2, 2:-2] * 8.0**3, filtered(left, [1, 2, 1], [-1, 0, 1]))
