@@ -174,9 +174,10 @@ class Search:
         name = base_name(frame_name(path))
 
         def fits(globs: Sequence[str]) -> bool:
-            paths = [each for each in globs if found or "/" in each]
-            return any(fnmatch.fnmatchcase(name, each) for each in globs) or any(
-                fnmatch.fnmatchcase(path, each) for each in paths
+            return any(
+                fnmatch.fnmatchcase(text, each)
+                for each in globs
+                for text in ((name, path) if found or "/" in each else (name,))
             )
 
         return (not self.include or fits(self.include)) and not fits(self.exclude)

@@ -75,7 +75,14 @@ def test_rolls_on_both_sides_of_a_right_angle_are_close_together():
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("roll_deg", 500.0), ("roll_ci95_deg", -1.0), ("height_m", -1.5)]
+    ("name", "value"),
+    [
+        ("roll_deg", 500.0),
+        ("roll_deg", -90.1),
+        ("roll_ci95_deg", -1.0),
+        ("pitch_deg", 90.5),
+        ("height_m", -1.5),
+    ],
 )
 def test_what_cannot_be_a_value_of_a_column_is_refused(name, value):
     rows = {"status": ["ok"] * 3, "roll_deg": [1.0, -90.0, 90.0]}

@@ -160,16 +160,15 @@ def test_a_level_pair_of_an_empty_road_is_left_as_it_is(empty_road):
 
 
 @pytest.mark.parametrize(("larger_percent", "lower"), [(0.2, 0.0), (0.0, 0.3), (0.0, 0.4), (0.0, -2.0)])
-def test_what_a_map_of_an_empty_road_hides_is_found_or_doubted_or_in_the_interval(
-    empty_road, larger_percent, lower
-):
+def test_what_a_map_of_an_empty_road_hides_is_found_or_doubted(empty_road, larger_percent, lower):
     right = seen_by(empty_road.right, larger_percent=larger_percent, lower=lower)
 
     match = match_pair(empty_road.left, right, StereoOptions())
 
     found = estimate_roll(match.disparity, Request(slope_error=match.slope_error))
-    off = math.radians(roll_deg(empty_road.left, empty_road.right)) - found.theta
-    assert match.doubt or abs(off) <= max(math.radians(0.1), found.ci95)
+    off = abs(math.radians(roll_deg(empty_road.left, empty_road.right)) - found.theta)
+    # an empty road hardly tells a scale from a bend of its rows; the interval says how far
+    assert match.doubt or off <= (found.ci95 if larger_percent else math.radians(0.1))
 
 
 def test_rows_that_are_bent_alone_are_seldom_taken_for_a_scale_without_a_word():

@@ -118,8 +118,11 @@ def test_straight_edges_tell_only_where_they_lie_along_the_rows(slope, share):
     assert textured_share(edges.astype(np.uint8)) == pytest.approx(share, abs=0.05)
 
 
-@pytest.mark.parametrize(("scale", "offset"), [(0.002, 0.3), (0.0, 0.04), (0.0, 0.12), (0.0, 0.5)])
-def test_what_lies_between_pixels_is_measured_without_a_pull_to_whole_ones(scale, offset):
+@pytest.mark.parametrize(
+    ("scale", "offset", "most"),
+    [(0.002, 0.3, 0.004), (0.0, 0.04, 0.006), (0.0, 0.12, 0.004), (0.0, 0.5, 0.006)],
+)
+def test_what_lies_between_pixels_is_measured_without_a_pull_to_whole_ones(scale, offset, most):
     rng = np.random.default_rng(3)
     waves = rng.uniform(-1.6, 1.6, (60, 2))  # rad/px: as fine as cameras resolve
     phases, heights = rng.uniform(0, 2 * np.pi, 60), rng.uniform(2, 8, 60)
@@ -138,7 +141,7 @@ def test_what_lies_between_pixels_is_measured_without_a_pull_to_whole_ones(scale
     views = seen(u, v), seen(level_x + 159.5 + shift, level_y + 119.5)
     found = measure_misalignment(Texture.of(views), np.full(u.shape, shift, np.float32), rounds=8)
     assert found.misalignment.scale == pytest.approx(scale, abs=5e-5)
-    assert found.misalignment.offset == pytest.approx(offset, abs=0.006)  # linearly 0.08
+    assert found.misalignment.offset == pytest.approx(offset, abs=most)  # linearly 0.08
     assert found.misalignment.twist * 160 * 120 == pytest.approx(0, abs=0.006)
 
 

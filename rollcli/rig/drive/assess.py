@@ -405,8 +405,9 @@ def _frames(rows: Any) -> RigFrames:
     numbers = {name: _floats(rows[name]) for name in (*COLUMNS, *SIZE) if name in rows}
     for name, (low, high) in BOUNDS.items():
         values = numbers.get(name, np.empty(0))
-        for value in values[(values < low) | (values > high)]:
-            raise UsageError(f"{value:g} is no value for {name}")
+        outside = values[(values < low) | (values > high)]
+        if outside.size:
+            raise UsageError(f"{outside[0]:g} is no value for {name}")
     if len({len(states), len(files), *map(len, numbers.values())}) > 1:
         raise UsageError("the columns differ in length")
     unknown = sorted(set(states.tolist()) - {"ok", "suspect", "error"})
