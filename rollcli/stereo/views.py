@@ -54,15 +54,19 @@ _HALVED_FROM = 4  # times smaller: views are halved first; means of four pixels 
 
 
 def shrink(view: NDArray[Any], factor: float) -> View:
-    """Shrink the view by `factor`; 1 leaves it as it is."""
+    """Shrink the view by `factor`, to be matched: each side as its calibration is; 1 leaves it as it is."""
     if factor == 1:
         return view
     height, width = matched_shape(view.shape, factor)
+    return cv2.resize(view, (width, height), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+
+
+def _by_halves(view: View, factor: float) -> View:
+    """Shrink a view by halves, to be looked at: an odd side becomes up to half a pixel too long."""
+    height, width = matched_shape(view.shape, factor)
     while factor == 2 or factor >= _HALVED_FROM:
         view, factor = _halved(view), factor / 2
-    if factor > 1:
-        view = cv2.resize(view, (width, height), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
-    return view[:height, :width]
+    return shrink(view, factor)[:height, :width]
 
 
 def _halved(view: NDArray[Any]) -> View:
@@ -76,7 +80,7 @@ def _halved(view: NDArray[Any]) -> View:
 
 def shrink_both(views: Views, factor: float) -> Views:
     """Both views, `factor` times smaller, to be looked at."""
-    left, right = (_third(each, factor) if round(factor) == 3 else shrink(each, factor) for each in views)
+    left, right = (_third(each, factor) if round(factor) == 3 else _by_halves(each, factor) for each in views)
     return left, right
 
 

@@ -65,12 +65,13 @@ def test_a_small_view_has_the_means_of_the_pixels_it_stands_for(factor):
 @pytest.mark.parametrize("factor", [2, 4])
 @pytest.mark.parametrize("shape", [(375, 1242), (376, 1241), (373, 1243)])
 def test_rows_of_an_odd_view_lie_at_even_distances(factor, shape):
+    """As a calibration is scaled where they are matched; so many rows apart where they are looked at."""
     lowest = np.clip(np.indices(shape)[0] - shape[0] + 256, 0, 255).astype(np.uint8)  # a grey level a row
-    small = shrink(lowest, factor)
-
-    assert small.shape == matched_shape(shape, factor)
-    seen = np.indices(small.shape)[0] * factor + (factor - 1) / 2 - shape[0] + 256
-    np.testing.assert_allclose(small[-50:-1], seen[-50:-1], atol=0.6)  # the last row may stand for fewer
+    matched, looked_at = shrink(lowest, factor), shrink_both((lowest, lowest), factor)[0]
+    for small, apart in ((matched, shape[0] / matched_shape(shape, factor)[0]), (looked_at, factor)):
+        assert small.shape == matched_shape(shape, factor)
+        seen = np.indices(small.shape)[0] * apart + (apart - 1) / 2 - shape[0] + 256
+        np.testing.assert_allclose(small[-50:-1], seen[-50:-1], atol=0.6)  # the last row may stand for fewer
 
 
 @pytest.mark.parametrize(
