@@ -211,7 +211,7 @@ def _rig(folder, name, *settings):
     for number, (value, error) in enumerate(zip(*drive(**given), strict=True)):
         roll, half = float(value), 1.96 * float(error)
         status = statuses.get(number, "ok")
-        posed = {"pitch_deg": 3 - roll / 2, "pitch_ci95_deg": half, "height_m": 1.5 + roll / 9}
+        posed = {"pitch_deg": 3 - roll / 2, "pitch_ci95_deg": half, "height_m": abs(1.5 + roll / 9)}
         lies = dict.fromkeys(ALIGNMENT_COLUMNS, pairs + roll / 20) if pairs else {}
         frame = Row(f"{place}/{number}.png", "r.png" if pairs else "", status, roll, half, **posed, **lies)
         rows.append(replace(frame, height_ci95_m=half / 9, method="gd", width=320, height=240))

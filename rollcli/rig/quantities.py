@@ -20,6 +20,8 @@ class Quantity:
         What names end in: "deg" or "m".
     scale : float
         What of it is as much as a degree of an angle.
+    period : float
+        After which it is the same again.
     """
 
     name: str
@@ -28,9 +30,10 @@ class Quantity:
     unit: str
     suffix: str
     scale: float = 1.0
+    period: float = math.inf
 
 
-ROLL = Quantity("roll", "roll_deg", "roll_ci95_deg", "°", "deg")
+ROLL = Quantity("roll", "roll_deg", "roll_ci95_deg", "°", "deg", period=180.0)
 PITCH = Quantity("pitch", "pitch_deg", "pitch_ci95_deg", "°", "deg")
 HEIGHT = Quantity("height", "height_m", "height_ci95_m", " m", "m", 0.1)
 QUANTITIES = (ROLL, PITCH, HEIGHT)

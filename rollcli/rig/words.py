@@ -8,7 +8,7 @@ import numpy as np
 from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
 from rollcli.rig.drive.posterior import TUNING, Estimate
 from rollcli.rig.drive.quantity import SequenceAssessment
-from rollcli.rig.quantities import HEIGHT, QUANTITIES, ROLL, Quantity
+from rollcli.rig.quantities import ALIGNMENT, HEIGHT, QUANTITIES, ROLL, Quantity
 
 # a thousandth of a degree or of a metre is below what any calibration is worth
 _FEWEST_DIGITS, _MOST_DIGITS = 2, 3
@@ -123,7 +123,7 @@ def findings(rig: RigAssessment, *, roll: bool = True) -> list[str]:
             sentences.append(
                 f"{rig.name_of(drive)} differs from {before} by {answer(drive.change, change=True)}"
             )
-        for quantity in QUANTITIES:
+        for quantity in (*QUANTITIES, *ALIGNMENT):
             found = drive.quantities.get(quantity.name)
             if found is not None:
                 sentences += _of_one(rig, drive, quantity, found, moved=roll or quantity is not ROLL)
@@ -140,7 +140,7 @@ def _of_one(
         yield f"{quantity.name} jumped by {change} at {frame_name(rig, drive, jump.frame)}"
     if found.drifts and moved:
         yield f"{quantity.name}{where} drifted by {drift_in_words(rig, drive, quantity)}"
-    if found.now.ci95 is None:
+    if found.now.ci95 is None and quantity in QUANTITIES:
         yield f"no interval for the {quantity.name}{where}: {too_few(found, quantity)}"
 
 

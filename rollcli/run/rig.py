@@ -1,5 +1,6 @@
 """`rollcli rig` from the command line: what is read and written, and the exit status."""
 
+import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -230,8 +231,9 @@ def run_rig(options: RigOptions) -> int:
     outputs = filter(None, [options.output, options.correction])
     writes = [each for each in outputs if not is_stream(each)]
     for names in (reads, writes):
-        if len(set(names)) < len(names):
-            raise UsageError(f"{next(each for each in names if names.count(each) > 1)}: is named twice")
+        paths = list(map(os.path.realpath, names))
+        if twice := [name for at, name in enumerate(names) if paths[at] in paths[:at]]:
+            raise UsageError(f"{twice[0]}: is named twice")
     check_options(options.gates)
     if listed_only(reads, writes, options.running):
         return 0
@@ -240,7 +242,7 @@ def run_rig(options: RigOptions) -> int:
     if options.against is not None:
         after, later, more = _assessed([options.against], options)
         missing, notes = missing or later, [*notes, *more]
-        changes = {each.name: difference(rig.now(each), after.now(each)) for each in QUANTITIES}
+        changes = {each.name: difference(rig.now(each), after.now(each), each) for each in QUANTITIES}
     calibration = Calibrations(options.calibration).of(rig.frames.files[-1])
     health = health_of(rig, calibration, 1.0 if calibration is None else _downscale(options.results[-1]))
     checks = run_checks(rig, options.gates, missing, changes.get(ROLL.name))

@@ -13,7 +13,7 @@ import numpy as np
 from rollcli.errors import ExitStatus, UsageError
 from rollcli.files.naming import listed
 from rollcli.rig.calibration import Calibration, for_matched
-from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
+from rollcli.rig.drive.assess import DriveAssessment, RigAssessment, difference
 from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.drive.quantity import SequenceAssessment
 from rollcli.rig.quantities import ALIGNMENT, HEIGHT, PITCH, ROLL, SIZE, Quantity
@@ -158,7 +158,8 @@ def health_of(
     parts = tuple(each.now for each in quantities)
     if calibration is not None:
         calibration = for_matched(calibration, *size, downscale)
-    return Health(quantities[0].used, parts, size, _reach(parts, *size), calibration)
+    used = min(each.segments[-1].used for each in quantities)  # after the last jump of any
+    return Health(used, parts, size, _reach(parts, *size), calibration)
 
 
 def _measured(
@@ -313,16 +314,15 @@ def _expected(
         of = f"{'at' if found.drifts else 'of'} {_frames(rig, drive, first, end)}"
         what = f"the {quantity.name} {of} is {answer(value, quantity)}"
         limit = f"{within:g}{quantity.unit} from {wanted:g}{quantity.unit}"
-        yield _told(name, what, value, within, limit, too_few(found, quantity), wanted)
+        off = difference(Estimate(wanted, 0.0), value, quantity)
+        yield _told(name, what, off, within, limit, too_few(found, quantity))
 
 
-def _told(
-    name: str, what: str, found: Estimate, most: float, limit: str, why: str, wanted: float = 0.0
-) -> Check:
-    """Compare with a limit how far an estimate is from what is wanted; `why`: it may have no interval."""
+def _told(name: str, what: str, found: Estimate, most: float, limit: str, why: str) -> Check:
+    """Compare with a limit how large an estimate is, either way; `why`: it may have no interval."""
     if found.value is None or found.ci95 is None:
         return Check(name, None, f"{what}: {why}")
-    off = abs(found.value - wanted)
+    off = abs(found.value)
     if off + found.ci95 <= most:
         return Check(name, True, f"{what}, at most {limit}")
     if off - found.ci95 > most:

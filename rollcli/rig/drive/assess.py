@@ -315,11 +315,11 @@ def assess_frames(frames: RigFrames, *, include_suspect: bool = False, groups: s
     )
 
 
-def difference(before: Estimate, after: Estimate) -> Estimate:
+def difference(before: Estimate, after: Estimate, quantity: Quantity) -> Estimate:
     """How much larger `after` is; no interval where one of them has none."""
     if before.value is None or after.value is None:
         return Estimate()
-    change = after.value - before.value
+    change = math.remainder(after.value - before.value, quantity.period)
     if before.ci95 is None or after.ci95 is None:
         return Estimate(change)
     return Estimate(change, math.hypot(before.ci95, after.ci95))
@@ -377,7 +377,7 @@ def _compared(drives: Sequence[DriveAssessment]) -> tuple[DriveAssessment, ...]:
     for drive in drives:
         roll = drive.quantities[ROLL.name]
         first = roll.segments[0].begin if roll.segments else Estimate()
-        change = difference(before, first)
+        change = difference(before, first, ROLL)
         wide = sterner * (change.ci95 if change.ci95 is not None else math.hypot(reach, _spread(roll)))
         differs = change.value is not None and abs(change.value) > wide
         result.append(replace(drive, change=change, differs=differs))

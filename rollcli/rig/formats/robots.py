@@ -32,7 +32,7 @@ def read_ros(first: File, second: File | None = None) -> Fields:
         return Fields(*known, width=width, height=height, lacks=lacks)
     right, *right_size = views[1]
     where = f"{first.name} and {second.name if second else ''}"
-    if left.tx != 0 and right.tx == 0:
+    if (left.tx != 0 and right.tx == 0) or left.tx < right.tx < 0:
         raise InputError(f"{where}: are in the wrong order: give --calib LEFT --calib RIGHT")
     if [width, height] != right_size:
         raise InputError(
