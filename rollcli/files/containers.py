@@ -31,6 +31,7 @@ VIDEOS = (".mp4", ".avi", ".mkv", ".mov")
 _PACKED = (".tar.gz", ".tgz", ".tar.xz", ".tar.bz2", ".tar.zst", ".7z", ".rar")
 _KINDS = "|".join(each[1:] for each in (*ARCHIVES, *BAGS, *VIDEOS))
 _INSIDE = re.compile(rf"(.*?\.(?:{_KINDS}))#(.*)", re.IGNORECASE | re.DOTALL)
+_MOST_LINKS = 40  # as many as Linux follows
 _POSITION = re.compile(r"#@([0-9]+(?:\+[0-9]+)+)$")
 
 
@@ -74,6 +75,12 @@ def is_archive(location: str) -> bool:
 def is_video(location: str) -> bool:
     """Tell whether this names a video, not one of its frames."""
     return location.lower().endswith(VIDEOS)
+
+
+def is_rest(location: str) -> bool:
+    """Tell whether this names what is broken behind the frames of a recording, not one of them."""
+    inside = split_member(location)
+    return inside is not None and inside[1] == "rest" and inside[0].lower().endswith((*BAGS, *VIDEOS))
 
 
 def bag_files(location: str) -> list[str]:
@@ -127,12 +134,29 @@ def members(path: str) -> Iterator[tuple[str, str]]:
 
 
 def _tar_members(path: str) -> Iterator[tuple[str, str]]:
+    """Yield what unpacking would give: of members of one name the last, and links as what they lead to."""
+    found: dict[str, str] = {}
+    links: dict[str, str] = {}
     try:
         with reading(path), tarfile.open(path, "r:") as archive:
             for each in archive:
                 archive.members = []  # type: ignore[attr-defined]  # a shard may have a million of them
+                name = each.name.removeprefix("./")
+                found.pop(name, None)
+                links.pop(name, None)
                 if each.isreg() and not each.issparse():
-                    yield each.name.removeprefix("./"), f"#@{each.offset_data}+{each.size}"
+                    found[name] = f"#@{each.offset_data}+{each.size}"
+                elif each.islnk():
+                    links[name] = each.linkname.removeprefix("./")
+                elif each.issym():
+                    links[name] = posixpath.normpath(posixpath.join(posixpath.dirname(name), each.linkname))
+        yield from found.items()
+        for name in links:
+            target, hops = name, 0
+            while target in links and hops < _MOST_LINKS:
+                target, hops = links[target], hops + 1
+            if target in found:
+                yield name, found[target]
     except (tarfile.TarError, ValueError, EOFError) as error:
         raise InputError(f"{path}: is a damaged archive: {str(error) or 'it ends too early'}") from None
 

@@ -516,12 +516,15 @@ def _flag(value: Any) -> bool | None:
 def _number(kind: type, low: float, high: float, value: Any) -> Any:
     if value is None or value == "":
         return None
-    number = kind(value)
+    number = value if isinstance(value, int) else float(value)
     # `1_0` is Python's notation, and a flag is no number
     is_one = "_" not in value if isinstance(value, str) else not isinstance(value, bool)
     if not (is_one and low <= number <= high and abs(number) < _MOST):
         raise ValueError(value)
-    return number
+    # programs that know no empty cell among whole numbers write 4 as 4.0
+    if kind is int and number % 1:
+        raise ValueError(value)
+    return kind(number)
 
 
 def _reader(name: str, kind: type) -> Callable[[Any], Any]:

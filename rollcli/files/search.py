@@ -325,7 +325,9 @@ def _as_pairs(left: str, right: str) -> str:
 
 def _matches(pattern: str) -> Iterator[str]:
     try:
-        yield from glob.iglob(pattern, recursive=True)  # noqa: PTH207 (Path.glob takes no absolute pattern)
+        found = glob.glob(pattern, recursive=True)  # noqa: PTH207 (Path.glob takes no absolute pattern)
+        # of several ways to a file the first counts: not by the order in which a file system lists them
+        yield from sorted(found, key=lambda each: (each.count(os.sep), each))
     except RecursionError:
         hint = "name the folder, with --recursive"
         raise UsageError(f"{pattern}: the folders lie too deep for a pattern; {hint}") from None

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from rollcli.files.containers import is_rest
 from rollcli.files.results import Row
 from rollcli.pictures.overlay import round_step
 from rollcli.report.page import Chart, scatter
@@ -72,7 +73,7 @@ def frame_axis(rows: Sequence[Row], rig: RigAssessment) -> FrameAxis:
     """
     seconds = seconds_of([row.file for row in rows])
     known = np.isfinite(seconds)
-    ends = np.array([row.file.endswith("#rest") for row in rows], bool)
+    ends = np.array([is_rest(row.file) for row in rows], bool)
     if not (len(rows) and known[0] and (known | ends).all()):
         return FrameAxis(len(rows))
     seconds = seconds[np.maximum.accumulate(np.where(known, np.arange(len(rows)), 0))]

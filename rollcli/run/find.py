@@ -1,8 +1,9 @@
 """Find the frames that a user named, and the calibration of each."""
 
 import contextlib
+import itertools
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path, PurePath, PurePosixPath
 from typing import TYPE_CHECKING, NamedTuple, overload
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple, overload
 from rollcli.errors import InputError, UsageError
 from rollcli.extras import require_extra
 from rollcli.files.atomic import is_file
-from rollcli.files.containers import BAGS, VIDEOS, bag_files, file_of, frame_name, is_video
+from rollcli.files.containers import BAGS, VIDEOS, bag_files, file_of, frame_name, is_rest, is_video
 from rollcli.files.inputs import Manifest, find_inputs, named_input, pair_inputs
 from rollcli.files.naming import Input
 from rollcli.files.search import IMAGE_ENDINGS, LEAVE_NONE, MAP_ENDINGS, Search, is_place, objects_behind
@@ -244,7 +245,7 @@ def map_frames(named: Named) -> Sequence[Frame]:
         from rollcli.files.recordings.frames import maps_of_bag
 
         found_maps = [maps_of_bag(files, name, given.topic) for name, files in bags]
-        return _bag_frames(found_maps, make)[:: given.every]
+        return _bag_frames(found_maps, make, given.every)
     if given.topic is not None:
         raise UsageError("--topic is of a bag (.bag, .db3, .mcap or a rosbag2 folder), and none is given")
     with _search(named, MAP_ENDINGS, maps=True) as search:
@@ -323,7 +324,7 @@ def pair_frames(named: Named) -> list[Frame]:
         )
     make = _FrameMaker(named)
     if any(views):
-        return _bag_pairs(named, make)[:: given.every]
+        return _bag_pairs(named, make)
     videos = VIDEOS if pairs.side_by_side is not None else ()
     with _search(named, (*IMAGE_ENDINGS, *videos)) as search:
         if pairs.side_by_side is not None:
@@ -334,7 +335,14 @@ def pair_frames(named: Named) -> list[Frame]:
         else:
             matched = pair_inputs(pairs.left, pairs.right, search, match=pairs.match)
         both = [views for pair in matched for views in _frames_of(*pair, pairs.side_by_side)]
-    return [make.frame(left, right) for left, right in both[:: given.every]]
+    taken = _each_of(given.every)
+    return [make.frame(left, right) for left, right in both if taken(left)]
+
+
+def _each_of(every: int) -> Callable[[Input], bool]:
+    """Return what tells, of one frame after the other, whether it is taken; what is broken always is."""
+    numbers = itertools.count()
+    return lambda frame: is_rest(frame.location) or next(numbers) % every == 0
 
 
 def _frames_of(left: Input, right: Input, layout: Layout | None) -> list[tuple[Input, Input]]:
@@ -369,7 +377,7 @@ def _bag_pairs(named: Named, make: "_FrameMaker") -> list[Frame]:
 
     tolerance = round(named.topics.sync_tolerance * 1e6)
     found = [pairs_of_bag(files, name, left, right, tolerance) for name, files in bags]
-    return _bag_frames(found, make)
+    return _bag_frames(found, make, named.inputs.every)
 
 
 def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
@@ -397,12 +405,13 @@ def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
     return allowed
 
 
-def _bag_frames(bags: "Iterable[BagFrames]", make: "_FrameMaker") -> list[Frame]:
+def _bag_frames(bags: "Iterable[BagFrames]", make: "_FrameMaker", every: int) -> list[Frame]:
     frames: list[Frame] = []
+    taken = _each_of(every)
     for bag in bags:
         if not make.quiet:
             say(*dict.fromkeys(bag.notes))
-        frames += [make.frame(left, right, bag.calibration) for left, right in bag.frames]
+        frames += [make.frame(left, right, bag.calibration) for left, right in bag.frames if taken(left)]
     return frames
 
 
@@ -412,18 +421,25 @@ class _FrameMaker:
     def __init__(self, named: Named) -> None:
         self.calibrations, self.quiet = Calibrations(named.calibration), named.quiet
         self._mask = named.region.mask
-        self._masks: dict[str, str] | None = None
+        self._masks: dict[str, list[str]] | None = None
         if self._mask is not None and is_place(self._mask):
             found = find_inputs([self._mask], Search(recursive=True))
-            self._masks = {Path(frame_name(each.name)).stem: each.location for each in found}
+            self._masks = {}
+            for each in found:
+                self._masks.setdefault(Path(frame_name(each.name)).stem, []).append(each.location)
         elif self._mask is not None and not (is_url(self._mask) or is_file(self._mask)):
             raise UsageError(f"{self._mask}: no such mask file or folder")
 
     def frame(self, left: Input, right: Input | None = None, calibration: Calibration | None = None) -> Frame:
         """Make the frame of a map, or of the views of a pair; `calibration` is that of its bag."""
         mask, stem = self._mask, PurePath(frame_name(left.name)).stem
-        if self._masks is not None and (mask := self._masks.get(stem)) is None:
-            raise UsageError(f"{left.name}: has no mask of its name in {self._mask}")
+        if self._masks is not None:
+            masks = self._masks.get(stem, [])
+            if not masks:
+                raise UsageError(f"{left.name}: has no mask of its name in {self._mask}")
+            if len(masks) > 1:
+                raise UsageError(f"{left.name}: has more than one mask of its name: {masks[0]}, {masks[1]}")
+            mask = masks[0]
         # what is made of an input must stay in its folder, whatever a store or an archive calls it
         foreign = is_url(left.location) or file_of(left.location) != left.location
         return Frame(

@@ -83,6 +83,7 @@ def make_plan(options: EstimateOptions) -> Plan:
         lambda: chain(calibrations, (path for frame in plan.frames for path in frame.reads())),
         chain(plan.files, images_of(plan.frames, options.images)),
     )
+    further = further_columns(frames, options)
     frames = _shard(frames, options.result)
     check_places(frames, [folder for _, folder in options.images.folders()])
     checked = options.calibration.given or options.pairs.side_by_side is not None
@@ -91,7 +92,6 @@ def make_plan(options: EstimateOptions) -> Plan:
         check_nothing_is_there(images_of(frames, options.images))
     if plan.format == "parquet" and is_stream(plan.output):
         raise UsageError("Parquet is a folder of parts: name it with --output")
-    further = further_columns(frames, options.result)
     return replace(plan, frames=frames, further=further, notes=tuple(notes))
 
 
@@ -107,14 +107,12 @@ def _check_start(options: EstimateOptions) -> None:
         raise UsageError(f"{flag} needs a result file: name it with --output")
 
 
-def further_columns(frames: Sequence[Frame], options: ResultOptions) -> tuple[str, ...]:
-    """List the columns that the result has beside those of every result.
-
-    The first frame's calibration tells of all: a rig has one camera.
-    """
-    camera = frames[0].calibration if frames else None
-    stretched = camera is not None and camera.fx != camera.fy
-    return (*((IMAGE_ROLL,) if stretched else ()), *((TIMING,) if options.timing else ()))
+def further_columns(frames: Sequence[Frame], options: EstimateOptions) -> tuple[str, ...]:
+    """List the columns that the result has beside those of every result; shards of a run have the same."""
+    # of names that are read as they are needed, the first tells of all
+    some = (frame.calibration for frame in (frames[:1] if options.inputs.sorted else frames))
+    stretched = any(camera is not None and camera.fx != camera.fy for camera in some)
+    return (*((IMAGE_ROLL,) if stretched else ()), *((TIMING,) if options.result.timing else ()))
 
 
 def _shard(frames: Sequence[Frame], options: ResultOptions) -> Sequence[Frame]:

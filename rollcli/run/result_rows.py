@@ -86,7 +86,9 @@ def _is_copy(frame: Frame, row: Row, options: FrameOptions) -> bool:
         found = estimate_roll(source.disparity, options.method.request(), mask=source.allowed)
     except (OSError, RollcliError):
         return False
-    return abs(math.degrees(found.theta) - (row.map_roll_deg or 0.0)) < _SAME_DEG
+    # of a pair the row is of the road matched along its plane, the map of all that was matched
+    most = max(_SAME_DEG, row.roll_ci95_deg or 0.0) if row.right_file else _SAME_DEG
+    return abs(math.degrees(found.theta) - (row.map_roll_deg or 0.0)) < most
 
 
 def _tell_suspects(rows: Sequence[Row], result: str, *, skip_suspect: bool, quiet: bool) -> None:

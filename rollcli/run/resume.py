@@ -18,7 +18,16 @@ from typing import Any, TypeVar, get_args
 from rollcli import __version__
 from rollcli.errors import InputError, OutputError
 from rollcli.files.locking import differences, not_resumable
-from rollcli.files.results import Row, format_row, parse_rows, read_run, run_path
+from rollcli.files.results import (
+    IMAGE_ROLL,
+    Row,
+    columns,
+    format_header,
+    format_row,
+    parse_rows,
+    read_run,
+    run_path,
+)
 from rollcli.files.storage import write_bytes
 from rollcli.files.stores.locations import base_name, public_name
 from rollcli.rig.calibration import Calibration
@@ -365,6 +374,7 @@ def arranged(data: bytes, plan: Plan) -> tuple[bytes, int]:
     bytes, int
         The result; and how many rows have left it, since their frames are gone.
     """
+    data = _with_columns(data, plan)
     lines = row_lines(io.BytesIO(data), plan.format)
     header = next(lines) if plan.format == "csv" else b""
     places, ends, end = dict[int, int](), [len(header)], len(header)
@@ -382,6 +392,19 @@ def arranged(data: bytes, plan: Plan) -> tuple[bytes, int]:
             pieces += [*waiting, data[ends[place] : ends[place + 1]]]
             waiting.clear()
     return b"".join(pieces), len(places)
+
+
+def _with_columns(data: bytes, plan: Plan) -> bytes:
+    """Return a result with the columns of this run: fx and fy of a calibration may have come to differ."""
+    first, further = data.partition(b"\n")[0], plan.further
+    others = further[1:] if IMAGE_ROLL in further else (IMAGE_ROLL, *further)
+    names = first.decode().split(",") if plan.format == "csv" else list(json.loads(first))
+    if names != list(columns(others)):
+        return data
+    rows = (replace(row, image_roll_deg=row.map_roll_deg) for row in parse_rows(data, plan.output))
+    return format_header(plan.format, further) + b"".join(
+        format_row(row, plan.format, further) for row in rows
+    )
 
 
 class RecordedOutput(ABC):

@@ -1,5 +1,6 @@
 """Archives are read as folders; what is in them can neither fill memory nor name a file elsewhere."""
 
+import math
 import tarfile
 import zipfile
 
@@ -126,3 +127,23 @@ def test_an_image_on_stdin_is_told_what_a_dash_means(tmp_path):
     done = ended(command("estimate", "-"), tmp_path, input=data, text=False)
     assert done.returncode == 2
     assert b"-: stands for a list of files on stdin" in done.stderr
+
+
+def test_a_tar_gives_what_unpacking_it_would(tmp_path):
+    for number in range(2):
+        write_kitti(tmp_path / f"{number}.png", road_map(0.1 * number))
+    with tarfile.open(tmp_path / "x.tar", "w") as file:
+        for number in range(2):
+            file.add(tmp_path / f"{number}.png", "a.png")
+        for name, kind in (
+            ("b.png", tarfile.LNKTYPE),
+            ("c.png", tarfile.SYMTYPE),
+            ("d.png", tarfile.SYMTYPE),
+        ):
+            link = tarfile.TarInfo(name)
+            link.type, link.linkname = kind, "c.png" if name == "d.png" else "a.png"
+            file.addfile(link)
+    found = rows_of(rollcli("estimate", "x.tar", cwd=tmp_path).out)
+    assert [row["file"] for row in found] == [f"x.tar#{name}.png" for name in "abcd"]
+    assert {row["roll_deg"] for row in found} == {found[0]["roll_deg"]}
+    assert float(found[0]["roll_deg"]) == pytest.approx(math.degrees(0.1), abs=0.05)

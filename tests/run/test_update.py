@@ -159,3 +159,18 @@ def test_objects_are_compared_by_their_tags(tmp_path, bucket, monkeypatch):
     monkeypatch.setattr(result_file, "_read", lambda paths: really(_noted(paths, read)))
     assert "(3 kept)" in estimate(tmp_path, "--update", **line).err
     assert read == [f"{folder}/frame2.png"]
+
+
+@pytest.mark.parametrize("result", ["rolls.csv", "rolls.jsonl"])
+def test_columns_that_come_and_go_with_a_calibration(tmp_path, tmp_path_factory, result):
+    """The column image_roll_deg is there where fx and fy differ, of any frame."""
+    write_maps(tmp_path / "maps", 3)
+    (tmp_path / "calib").mkdir()
+    line = {"inputs": ("maps", "--calib", "calib"), "result": result, "status": 0}
+    for fy in (100, 130, 100):
+        for number in range(3):
+            left = f"P0: 100 0 80 0 0 {fy if number != 1 else 100} 60 0 0 0 1 0\n"
+            text = left + left.replace("P0: 100 0 80 0", "P1: 100 0 80 -50")
+            (tmp_path / "calib" / f"frame{number}.txt").write_text(text)
+        estimate(tmp_path, "--update", **line)
+        assert written(tmp_path)[result] == anew(tmp_path, tmp_path_factory, **line)[result]

@@ -369,7 +369,10 @@ class _Sqlite:
     def __init__(self, path: str) -> None:
         self.path, self.broken = path, ""
         # the threads of a worker, which wait for the network, take turns at reading
-        where = f"{Path(path).resolve().as_uri()}?mode=ro&immutable=1"
+        here = Path(path).resolve()
+        # what a recorder that was killed had not moved into the base yet lies in its journal
+        waits = Path(f"{here}-wal").is_file() and Path(f"{here}-wal").stat().st_size > 0
+        where = f"{here.as_uri()}?mode=ro{'' if waits else '&immutable=1'}"
         self._base: Any = sqlite3.connect(where, uri=True, check_same_thread=False)
         weakref.finalize(self, self._base.close)
         # reads what is there of a file that is shorter than it says

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError, as_usage
 from rollcli.files.bounded import state_of
-from rollcli.files.naming import Input, listed
+from rollcli.files.naming import Input, listed, natural_key
 from rollcli.files.recordings import messages
 from rollcli.files.recordings.bags import Bag, Message, Topic, opened
 from rollcli.files.recordings.messages import CAMERA_INFO, COMPRESSED, DISPARITY, IMAGE, CameraInfo
@@ -20,6 +20,7 @@ from rollcli.rig.calibration import Calibration
 
 _VIEWS = (IMAGE, COMPRESSED)
 _RAW = "image_raw"
+_SIDES = ("left", "right")
 _NO_P = "no CameraInfo with a principal point (P): no pitch and no height without --calib"
 
 
@@ -80,7 +81,12 @@ def maps_of_bag(files: Sequence[str], name: str, topic: str | None) -> BagFrames
         with contextlib.suppress(InputError):  # a damaged one says so in its row
             stated = messages.baseline_of(topics[chosen], _message(each.location).data, chosen)
             break
-    bag.calibration = _calibration(left, right, stated, f"CameraInfo of {name}")
+    if stated < 0 and right is None:
+        bag.notes.append(f"{name}: {chosen} states a baseline T of {stated:g} m: taken as {-stated:g} m")
+    bag.calibration = _calibration(left, right, abs(stated), f"CameraInfo of {name}")
+    if bag.calibration is not None and topics[chosen].type == DISPARITY:
+        # its disparities are x_l - x_r - (cx_l - cx_r) already [stereo_msgs/DisparityImage]
+        bag.calibration = replace(bag.calibration, doffs=0.0)
     if bag.calibration is None and (found.cameras or topics[chosen].type == DISPARITY):
         bag.notes.append(f"{name}: {_NO_P}")
     _finish(bag, found, name, chosen)
@@ -180,6 +186,8 @@ def read_frame(path: str, member: str, place: Sequence[int], name: str) -> bytes
         raise InputError(f"{name}: no such topic in {path}")
     if not place:
         place = _index(path, topic_name).get(stamp, ())
+        if len(place) == 4 and messages.is_map(topic, bag.read((place[0], place[1])).data, name):
+            place = place[:2]  # depth maps, too, may be called image_raw
     if not place:
         raise InputError(f"{name}: no such frame in {path}")
     raw_of = None
@@ -207,8 +215,12 @@ def _known_topics(path: str, size: int, modified_ns: int, process: int) -> dict[
 
 @lru_cache(maxsize=2)  # for names without a place, such as those of a result that is drawn
 def _index(path: str, topic: str) -> dict[str, tuple[int, ...]]:
-    found = _scan([path], [_topics([path])[topic]], {})
-    return {each.name.rpartition("@")[2]: _place(each.location) for each in found.frames[topic]}
+    topics = _topics([path])
+    found = _scan([path], [topics[topic]], topics)
+    frames, info = found.frames[topic], found.cameras.get(_beside(topic))
+    if _RAW in topic and info is not None and info.changes_raw_views:
+        frames = [_rectified(found, topic, each) for each in frames]
+    return {each.name.rpartition("@")[2]: _place(each.location) for each in frames}
 
 
 def _topics(files: Iterable[str]) -> dict[str, Topic]:
@@ -277,6 +289,7 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
     places: dict[tuple[str, str], str] = {}
     broken = []
     seen: dict[str, int] = {}
+    endings: dict[str, str] = {}
     for path in files:
         bag = _opened(path)
         stem = os.path.splitext(os.path.basename(path))[0]  # noqa: PTH119, PTH122
@@ -293,12 +306,17 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
             name = f"{path}#{topic.name}@{stamp}"
             seen[name] = seen.get(name, -1) + 1
             again = f".{seen[name]}" if seen[name] else ""  # a recorder may write a message twice
-            ending = ".png" if topic.type == COMPRESSED else ".npy"
+            if topic.name not in endings:
+                with contextlib.suppress(InputError):  # a damaged one says so in its row
+                    endings[topic.name] = messages.ending_of(topic, bag.read(message.place).data, name)
+            ending = endings.get(topic.name, ".npy")
             relative = f"{stem}_{stamp}{again.replace('.', '_')}{ending}"
             shown = f"{name}{again}".replace(os.sep, "/")
             frames[topic.name].append(Input(f"{name}{again}#@{place}", shown, relative, stamp))
         if bag.broken:
             broken.append((path, stem))
+    for each in frames.values():  # a recorder writes messages as they come in
+        each.sort(key=lambda frame: natural_key(frame.name))
     return _Found(frames, cameras, places, broken)
 
 
@@ -320,13 +338,14 @@ def _beside(topic: str) -> str:
 
 
 def _camera(found: _Found, topic: str, *, right: bool) -> CameraInfo | None:
-    """Return the one left, or right, camera; of several the one whose namespace has most in common."""
-    fitting = [
-        (len(os.path.commonprefix([name, topic])), name)  # noqa: RUF071 (letter by letter)
-        for name, info in found.cameras.items()
-        if info.usable and (info.p[3] != 0) is right
-    ]
-    return found.cameras[max(fitting)[1]] if fitting else None
+    """Return the left, or right, camera: of several the nearest by namespace, then one that is called so."""
+    fitting = [name for name, info in found.cameras.items() if info.usable and (info.p[3] != 0) is right]
+
+    def nearness(name: str) -> tuple[int, bool, str]:
+        shared = os.path.commonprefix([name.split("/"), topic.split("/")])  # noqa: RUF071 (of parts)
+        return len(shared), _SIDES[right] in name, name
+
+    return found.cameras[max(fitting, key=nearness)] if fitting else None
 
 
 def _calibration(

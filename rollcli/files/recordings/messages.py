@@ -23,9 +23,11 @@ DISPARITY, IMAGE, COMPRESSED = (
     "sensor_msgs/CompressedImage",
 )
 CAMERA_INFO = "sensor_msgs/CameraInfo"
+_ZSTD = b"\x28\xb5\x2f\xfd"
 _VIDEO_STARTS = (b"\0\0\1", b"\0\0\0\1")  # start codes of H.264 and H.265 [ITU-T H.264, annex B]
 _AS_VIDEO = "export the topic as .mp4, and read the video"
-MAP_ENCODINGS = ("mono16", "16UC1", "16SC1", "32FC1")  # of images that hold disparities or depths
+_ONLY_MAPS = ("16UC1", "16SC1", "32FC1")
+MAP_ENCODINGS = ("mono16", *_ONLY_MAPS)  # of images that hold disparities or depths
 # numpy's dtype, and the channels
 _PIXELS = {
     **dict.fromkeys(("mono8", "8UC1"), ("u1", 1)),
@@ -117,9 +119,9 @@ def image_encoding(topic: Topic, data: memoryview, name: str) -> str:
 
 
 def baseline_of(topic: Topic, data: memoryview, name: str) -> float:
-    """Return |T| of a DisparityImage, m; 0 where it is not stated."""
+    """Return T of a DisparityImage, m, of the sign that it has there; 0 where it is not stated."""
     found = _decoded(topic, data, name)
-    length = abs(float(found.T if topic.encoding == "ros1" else found.t))
+    length = float(found.T if topic.encoding == "ros1" else found.t)
     return length if math.isfinite(length) else 0.0
 
 
@@ -152,7 +154,9 @@ def content_of(
                 f"{name}: is a frame of a video (H.264 or H.265), which needs those before it: {_AS_VIDEO}"
             )
         if "compressedDepth" in str(found.format):
-            packed = packed[max(packed.find(png.SIGNATURE), 0) :]
+            head, packed = packed[:12], packed[max(packed.find(png.SIGNATURE), 0) :]
+            if _is_quantized(found):
+                return _unquantized(head, packed, name)
         if raw_of is None:
             return packed
         decode = png.picture if packed.startswith(png.SIGNATURE) else pictures.decode_picture
@@ -161,11 +165,38 @@ def content_of(
         values = _pixels(found.image, name)
         least = float(found.min_disparity)
         below = values < least
-        if values.ndim == 2 and values.dtype.kind == "f" and below.any() and not below.all():
+        known = np.isfinite(values)  # ZED's are all negative, and NaN where there are none
+        if values.ndim == 2 and values.dtype.kind == "f" and below.any() and (known & ~below).any():
             values = np.where(below, np.nan, values).astype(values.dtype)
         return values
     values = _pixels(found, name)
     return values if raw_of is None else _rectified(values, raw_of, name)
+
+
+def ending_of(topic: Topic, data: memoryview, name: str) -> str:
+    """Return the ending of a file of what a message holds: pixels, or a file of its own."""
+    return ".npy" if topic.type != COMPRESSED or _is_quantized(_decoded(topic, data, name)) else ".png"
+
+
+def _is_quantized(image: Any) -> bool:
+    return str(image.format).startswith("32FC1") and "compressedDepth" in str(image.format)
+
+
+def _unquantized(head: bytes, packed: bytes, name: str) -> NDArray[Any]:
+    """Return depths z, m, of a PNG of a / z + b [compressed_depth_image_transport]; no data is NaN."""
+    try:
+        a, b = struct.unpack("<4xff", head)
+    except struct.error:
+        raise InputError(f"{name}: is a damaged compressedDepth message") from None
+    stored = png.picture(packed, name)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        depths = np.float32(a) / (stored.astype(np.float32) - np.float32(b))
+    return np.where(stored > 0, depths, np.float32(np.nan))
+
+
+def is_map(topic: Topic, data: memoryview, name: str) -> bool:
+    """Tell whether the pixels of a message can only be disparities or depths."""
+    return topic.type == DISPARITY or image_encoding(topic, data, name) in _ONLY_MAPS
 
 
 def _decoded(topic: Topic, data: memoryview, name: str) -> Any:
@@ -173,6 +204,11 @@ def _decoded(topic: Topic, data: memoryview, name: str) -> Any:
     try:
         return decode(data, topic.type.replace("/", "/msg/"))
     except Exception as error:  # noqa: BLE001 (a damaged message fails anywhere in the decoder)
+        if bytes(data[:4]) == _ZSTD:
+            raise InputError(
+                f"{name}: is compressed by itself (--compression-mode message): rewrite the bag without, "
+                "by ros2 bag convert"
+            ) from None
         raise InputError(f"{name}: is a damaged message of {topic.type}: {type(error).__name__}") from None
 
 

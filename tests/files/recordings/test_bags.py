@@ -3,6 +3,7 @@
 import contextlib
 import math
 import sqlite3
+import struct
 from pathlib import Path
 
 import cv2
@@ -11,6 +12,7 @@ import pytest
 
 import rollcli as package
 from rollcli.errors import InputError, UsageError
+from rollcli.files.formats import read_image
 from tests.files.recordings.bag_files import KINDS, camera_info, compressed, disparity_image, image, write_bag
 from tests.run_cli import keep_rows, road_map, rollcli, write_pair
 from tests.run_cli import rows_of as rows
@@ -322,3 +324,89 @@ def test_a_bag_of_several_files_is_one_drive(tmp_path):
     (folder / "split_1.mcap").rename(folder / "split_1.mcap.zstd")
     refusal = rollcli("estimate", "split", cwd=tmp_path).refused()
     assert "split: its file split_1.mcap.zstd is compressed as a whole; unpack it by zstd -d" in refusal
+
+
+@pytest.mark.parametrize(
+    ("topic", "p"),
+    [
+        ("/stereo/right/camera_info", (350.0, 0, 90, *P_RIGHT[3:])),
+        ("/stereo/down/camera_info", (*P[:6], 20, *P[7:])),
+    ],
+)
+def test_pitch_and_height_of_disparity_images_take_the_left_camera_alone(tmp_path, topic, p):
+    """They are x_l - x_r - (cx_l - cx_r); of several cameras it is that of the nearest namespace."""
+
+    def other(store):
+        yield from (each for each in drive(2)(store) if each[0] != topic)
+        yield topic, START, camera_info(store, START, (160, 120), p)
+
+    paths = [write_bag(tmp_path, name, "mcap", make) for name, make in (("a", drive(2)), ("b", other))]
+    whole, found = (rows(rollcli("estimate", path, cwd=tmp_path).out) for path in paths)
+    for one, two in zip(whole, found, strict=True):
+        assert (one["pitch_deg"], one["height_m"]) == (two["pitch_deg"], two["height_m"])
+
+
+@pytest.mark.parametrize("given", [(), ("--scale", "-1")])
+def test_negative_disparities_with_nan_are_not_below_the_least_one(tmp_path, given):
+    def negative(store):
+        for number, each in enumerate(maps(2)):
+            values = np.where(np.arange(160) < 20, np.nan, -each)
+            yield "/d", START + number, disparity_image(store, values, START + number, number, least=1.0)
+
+    found = rows(rollcli("estimate", write_bag(tmp_path, "zed", "mcap", negative), *given, cwd=tmp_path).out)
+    if given:
+        assert [float(row["roll_deg"]) for row in found] == pytest.approx([0, 1], abs=0.05)
+    else:
+        assert all("--scale -1" in row["message"] for row in found)
+
+
+def test_depths_that_are_packed_as_inverses_are_depths(tmp_path):
+    """As compressed_depth_image_transport stores 32FC1: a / z + b, in a PNG behind a, b and a format."""
+    a, b = 100.0 * 101, 1 - 100.0 * 101 / 50
+    camera = ["--focal", "350", "--principal-point", "80,60", "--baseline", "0.5"]
+
+    def make(store):
+        for number, each in enumerate(maps(2)):
+            depth = np.where(each > 0, 175 / np.maximum(each, 1e-6), np.inf)
+            stored = np.where(depth < 50, a / depth + b, 0).round().astype(np.uint16)
+            packed = struct.pack("<iff", 0, a, b) + cv2.imencode(".png", stored)[1].tobytes()
+            yield (
+                "/z",
+                START + number,
+                compressed(store, packed, "32FC1; compressedDepth png", START + number),
+            )
+
+    path = write_bag(tmp_path, "depth", "mcap", make)
+    given = ["--topic", "/z", "--encoding", "depth", *camera, "--derotated", tmp_path / "up"]
+    found = rows(rollcli("estimate", path, *given, cwd=tmp_path).out)
+    assert [float(row["roll_deg"]) for row in found] == pytest.approx([0, 1], abs=0.05)
+    for number, each in enumerate(maps(2)):
+        np.save(tmp_path / f"{number}.npy", each)
+    true = rows(rollcli("estimate", "0.npy", "1.npy", *camera, cwd=tmp_path).out)
+    for one, other in zip(found, true, strict=True):
+        assert float(one["height_m"]) == pytest.approx(float(other["height_m"]), abs=0.005)
+    assert np.load(tmp_path / "up" / f"depth_{START}.npy").dtype == np.float32
+
+
+def test_rows_are_in_the_order_of_stamps_whatever_was_recorded_first(tmp_path):
+    def mixed(store):
+        for number in (2, 0, 1):
+            stamp = START + number * STEP
+            yield "/d", stamp, disparity_image(store, maps(3)[number], stamp, number)
+
+    found = rows(rollcli("estimate", write_bag(tmp_path, "mixed", "mcap", mixed), cwd=tmp_path).out)
+    assert [float(row["roll_deg"]) for row in found] == pytest.approx([0, 1, 2], abs=0.1)
+
+
+def test_a_raw_view_that_is_read_by_its_name_is_rectified(tmp_path):
+    view, d = np.random.default_rng(0).integers(0, 255, (120, 160), np.uint8), (-0.2, 0.0, 0.0, 0.0, 0.0)
+    k = (340.0, 0, 82, 0, 340, 58, 0, 0, 1)
+
+    def make(store):
+        yield "/l/camera_info", START, camera_info(store, START, (160, 120), P, d, k)
+        yield "/l/image_raw", START, image(store, view, "mono8", START)
+
+    name = f"{write_bag(tmp_path, 'raw', 'mcap', make)}#/l/image_raw@{START}"
+    seen = np.array(k).reshape(3, 3), np.array(d), np.eye(3), np.array(P).reshape(3, 4)[:, :3]
+    where = cv2.initUndistortRectifyMap(*seen, (160, 120), cv2.CV_32FC1)
+    np.testing.assert_array_equal(read_image(name, name), cv2.remap(view, *where, cv2.INTER_LINEAR))
