@@ -151,7 +151,7 @@ class Command(click.Command):
             formatter.write_dl([(str(int(status)), meaning) for status, meaning in self.statuses.items()])
 
 
-def option(names: str, kind: ParamType, text: str, *needs: Needs, **attributes: Any) -> Declaration:
+def option(names: str, kind: ParamType, *needs: Needs, text: str = "", **attributes: Any) -> Declaration:
     """Declare an option.
 
     Parameters
@@ -160,10 +160,10 @@ def option(names: str, kind: ParamType, text: str, *needs: Needs, **attributes: 
         Such as "-q, --quiet".
     kind : ParamType
         What it takes; `FLAG`: nothing. Its `metavar`, if it has one, stands for it in the help.
-    text : str
-        Its help.
     *needs : Needs
         What it needs to have an effect.
+    text : str, optional
+        Its help; by default what the docstring of a record says of its field: see `record` and `command`.
     **attributes
         What else `click.option` and `Option` take.
     """
@@ -195,7 +195,7 @@ def record(
 ) -> Declaration:
     """Declare a section of options that the command receives as one record.
 
-    An option that declares no default has that of the record's field, whose name may add the unit: `_deg`.
+    An option that declares no default or no help has those of the record's field: see `_fill`.
 
     Parameters
     ----------
@@ -210,34 +210,53 @@ def record(
     only_with : sequence of Needs
         See `Option`.
     fields : class, optional
-        Whose fields have the defaults; by default `make`.
+        Whose fields have defaults and help; by default `make`.
     """
     options = section(title, *declarations, only_with=only_with)
-    known = inspect.signature(fields or make).parameters.items()
-    defaults = {name: None if field.default is field.empty else field.default for name, field in known}
-
-    def field_of(option: str) -> str:
-        return f"{option}_deg" if f"{option}_deg" in defaults else option
 
     def declare(function: Callable[..., Any]) -> Callable[..., Any]:
-        params = _declare(function, [options])
-        for param in params:
-            default = defaults.get(field_of(str(param.name)))
-            own = not isinstance(param, Option) or param.has_own_default
-            if not own and not (default is None or default is False or default == ()):
-                if isinstance(param.type, Parsed) and param.type.between:
-                    default = param.type.shown(default)
-                param.default = default
+        field_of = _fill(_declare(function, [options]), fields or make)
 
         @functools.wraps(function)  # its parameters, too
         def gathered(**values: Any) -> Any:
-            names = [str(param.name) for param in params]
-            values[name] = make(**{field_of(each): values.pop(each) for each in names})
+            values[name] = make(**{field: values.pop(each) for each, field in field_of.items()})
             return function(**values)
 
         return gathered
 
     return declare
+
+
+# of a docstring's sections Attributes and Examples
+_FIELD = re.compile(r"^(\w+) : .+\n((?: {4}.+\n?)+)", re.MULTILINE)
+_EXAMPLE = re.compile(r"^(\S.*)\n((?: {4}.+\n?)+)", re.MULTILINE)
+
+
+def _fill(params: Sequence[click.Parameter], record: Any) -> dict[str, str]:
+    """Give options that declare no default or no help those of their fields in a record; return the fields.
+
+    The name of a field may add the unit, `_deg`; that of --from is `result`.
+    """
+    known = inspect.signature(record).parameters
+    texts: dict[str, str] = {}
+    for each in reversed(inspect.getmro(record)):
+        texts |= dict(_FIELD.findall(inspect.cleandoc(each.__doc__ or "")))
+    field_of: dict[str, str] = {}
+    for param in params:
+        name = "result" if param.name == "from" else str(param.name)
+        field = field_of[str(param.name)] = f"{name}_deg" if f"{name}_deg" in known else name
+        if not isinstance(param, Option):
+            continue
+        # the space that click puts before the defaults that it adds
+        text = " ".join(texts.get(field, "").split()).replace(" [default:", "  [default:")
+        param.help = param.help or text
+        default = known[field].default if field in known else None
+        unsaid = default is None or default is False or default in ((), inspect.Parameter.empty)
+        if not (param.has_own_default or unsaid):
+            if isinstance(param.type, Parsed) and param.type.between:
+                default = param.type.shown(default)
+            param.default = default
+    return field_of
 
 
 def _declare(function: Callable[..., Any], declarations: Sequence[Declaration]) -> list[click.Parameter]:
@@ -249,15 +268,24 @@ def _declare(function: Callable[..., Any], declarations: Sequence[Declaration]) 
     return declared
 
 
-def command(**attributes: Any) -> Callable[[Callable[..., Any]], Command]:
-    """Make a command of a function, named after it; its docstring is the help."""
-    return lambda function: Command(
-        function.__name__,
-        callback=function,
-        params=getattr(function, "__click_params__", [])[::-1],
-        help=function.__doc__,
-        **attributes,
-    )
+def command(fields: Any = None, **attributes: Any) -> Callable[[Callable[..., Any]], Command]:
+    """Make a command of a function, named after it.
+
+    Its docstring is the help; the section Examples has purposes, and indented below each its command, or
+    several steps. `fields` is the record that it makes of its options: those that are part of no smaller one
+    have their defaults and help from there, as in `record`.
+    """
+
+    def make(function: Callable[..., Any]) -> Command:
+        params = getattr(function, "__click_params__", [])[::-1]
+        if fields is not None:
+            _fill([each for each in params if isinstance(each, Option) and not each.help], fields)
+        text, _, examples = inspect.cleandoc(function.__doc__ or "").partition("\n\nExamples\n--------\n")
+        shown = [(purpose, inspect.cleandoc(steps)) for purpose, steps in _EXAMPLE.findall(examples)]
+        words: dict[str, Any] = {"help": text, "examples": shown, **attributes}
+        return Command(function.__name__, callback=function, params=params, **words)
+
+    return make
 
 
 def _tell_idle(ctx: click.Context) -> None:
@@ -404,7 +432,7 @@ def _key(declared: click.Option) -> str:
 config_option = option(
     "--config",
     FILE,
-    "TOML file with option names as keys; flags and the environment win over it.",
+    text="TOML file with option names as keys; flags and the environment win over it.",
     is_eager=True,
     expose_value=False,
     callback=_use,

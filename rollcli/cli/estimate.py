@@ -87,67 +87,20 @@ result_options = record(
         OutputFile(
             (".csv", ".jsonl", ".ndjson", ".parquet"), "CSV (.csv), JSON Lines (.jsonl) or Parquet (.parquet)"
         ),
-        "Where the rows go (-: stdout).",
     ),
-    option(
-        "--format",
-        Choice("csv", "jsonl", "parquet"),
-        "CSV, JSON Lines, or Parquet (a folder of parts).  [default: by FILE's ending, else csv]",
-    ),
-    option(
-        "--part-rows",
-        Number("N", at_least=1, whole=True),
-        "Rows of each part, of Parquet and of results in an object store.",
-    ),
-    option("--resume", FLAG, "Keep the rows of an interrupted run and do the rest."),
-    option(
-        "--update",
-        FLAG,
-        "As --resume, also of a whole result: do the frames again whose content has changed, add new "
-        "ones, and leave out those that are gone.",
-    ),
-    option(
-        "--retry-failed",
-        FLAG,
-        "With --resume or --update: do the frames again whose rows are error, such as those of files "
-        "mended since.",
-    ),
-    option("--shard", SHARD, "Take every N-th frame from the I-th."),
-    option(
-        "--shard-by",
-        Choice("every", "range"),
-        "every: --shard takes every N-th frame; range: the I-th of N runs of consecutive frames.",
-    ),
-    option("--fail-fast", FLAG, "Stop at the first frame that fails."),
-    option("--timing", FLAG, "Add the column elapsed_ms: milliseconds spent on the frame."),
+    option("--format", Choice("csv", "jsonl", "parquet")),
+    option("--part-rows", Number("N", at_least=1, whole=True)),
+    option("--resume", FLAG),
+    option("--update", FLAG),
+    option("--retry-failed", FLAG),
+    option("--shard", SHARD),
+    option("--shard-by", Choice("every", "range")),
+    option("--fail-fast", FLAG),
+    option("--timing", FLAG),
 )
 
 
-@command(
-    examples=[
-        ("A folder of maps", "rollcli estimate maps/ -o rolls.csv"),
-        (
-            "Stereo pairs, with the maps turned upright and their v-disparity images",
-            "rollcli estimate --left cam/left --right cam/right -o rolls.csv --derotated upright/ "
-            "--vdisparity vdisparity/",
-        ),
-        ("Go on where an interrupted run has stopped", "rollcli estimate maps/ -o rolls.csv --resume"),
-        ("Do what is new or has changed since", "rollcli estimate maps/ -o rolls.csv --update"),
-        (
-            "Another program's list of files, angles to yet another one",
-            "find . -name '*_disp.png' | rollcli estimate - | sort -t, -gk4",
-        ),
-        (
-            "Pitch and camera height too, with a calibration file of each frame",
-            "rollcli estimate --left image_0 --right image_1 --calib calib/ -o pose.csv",
-        ),
-        ("A video that holds both views", "rollcli estimate drive.mp4 --side-by-side -o rolls.csv"),
-        (
-            "The paper's setting: every pixel is road",
-            "rollcli estimate crops/ --road all --method gd -o rolls.csv",
-        ),
-    ]
-)
+@command()
 @input_options
 @pair_options
 @topic_options
@@ -174,6 +127,25 @@ def estimate(ctx: click.Context, /, **records: Any) -> None:
     patterns, or - for paths on stdin; bags; with --side-by-side images and videos that hold both views.
 
     A positive roll means that the rig is rolled counter-clockwise seen from behind: its right end is up.
+
+    Examples
+    --------
+    A folder of maps
+        rollcli estimate maps/ -o rolls.csv
+    Stereo pairs, with the maps turned upright and their v-disparity images
+        rollcli estimate --left left --right right -o rolls.csv --derotated upright/ --vdisparity vdisparity/
+    Go on where an interrupted run has stopped
+        rollcli estimate maps/ -o rolls.csv --resume
+    Do what is new or has changed since
+        rollcli estimate maps/ -o rolls.csv --update
+    Another program's list of files, angles to yet another one
+        find . -name '*_disp.png' | rollcli estimate - | sort -t, -gk4
+    Pitch and camera height too, with a calibration file of each frame
+        rollcli estimate --left image_0 --right image_1 --calib calib/ -o pose.csv
+    A video that holds both views
+        rollcli estimate drive.mp4 --side-by-side -o rolls.csv
+    The paper's setting: every pixel is road
+        rollcli estimate crops/ --road all --method gd -o rolls.csv
     """
     options = EstimateOptions(**records)
     result = options.result

@@ -36,27 +36,16 @@ def _run(ctx: click.Context, options: ConvertOptions) -> None:
 
 rotation_options = section(
     "Angle",
-    option(
-        "--roll",
-        Number("DEG", at_least=-180, at_most=180),
-        "Of the rig, for every map, degrees; positive: its right end is up.",
-    ),
-    option("--from", RESULT, "The angle of each map, from what `rollcli estimate` wrote; matched by stem."),
-    option("--skip-suspect", FLAG, "With --from, leave out the maps whose angle is suspect."),
-    option("--expand", FLAG, "Enlarge the maps so that their corners are kept."),
-    option(
-        "--save-matrix",
-        FLAG,
-        "Beside each map write NAME.txt: the 3x3 matrix that takes its pixels to the new ones.",
-    ),
+    option("--roll", Number("DEG", at_least=-180, at_most=180)),
+    option("--from", RESULT),
+    option("--skip-suspect", FLAG),
+    option("--expand", FLAG),
+    option("--save-matrix", FLAG),
 )
 
 
 @command(
-    examples=[
-        ("The angles that estimate found", "rollcli derotate maps/ --from rolls.csv -o upright/"),
-        ("One angle for all, nothing cut off", "rollcli derotate maps/ --roll 2.5 --expand -o upright/"),
-    ]
+    fields=DerotateOptions,
 )
 @input_options
 @rotation_options
@@ -76,32 +65,27 @@ def derotate(ctx: click.Context, /, **options: Any) -> None:
     With --from, every map needs its row and every row with an angle its map: what has no partner is an error
     that names it, before anything is written. Suspect angles are used, and a line says how many there are;
     --skip-suspect leaves their maps out.
+
+    Examples
+    --------
+    The angles that estimate found
+        rollcli derotate maps/ --from rolls.csv -o upright/
+    One angle for all, nothing cut off
+        rollcli derotate maps/ --roll 2.5 --expand -o upright/
     """
     result, roll_deg = options.pop("from"), options.pop("roll")
     _run(ctx, DerotateOptions(**options, result=result, roll_deg=roll_deg))
 
 
 @command(
-    examples=[
-        ("A folder of pairs", "rollcli disparity --left cam/left --right cam/right -o maps/"),
-        (
-            "At half the size, as floating-point TIFF",
-            "rollcli disparity --left 'im0*.png' --right 'im1*.png' --downscale 2 --save-as tiff -o maps/",
-        ),
-        ("A video that holds both views", "rollcli disparity drive.mp4 --side-by-side -o maps/"),
-    ]
+    fields=DisparityOptions,
 )
 @pair_input_options
 @pair_options
 @topic_options
 @output_folder_option
 @save_as_option
-@option(
-    "--preview",
-    DIR,
-    "Also write each map as a picture to look at, in colour with a scale in pixels, PNG.",
-    section="Output",
-)
+@option("--preview", DIR, section="Output")
 @stereo_options
 @cluster_options
 @config_option
@@ -112,50 +96,31 @@ def disparity(ctx: click.Context, /, **options: Any) -> None:
     Images are PNG, JPEG, TIFF, BMP, PGM or PPM, of 8 or 16 bits, grey or colour. An image without a partner
     is an error that names it, before anything runs. INPUTS are images or videos that hold both views
     (--side-by-side), or bags (--left-topic, --right-topic).
+
+    Examples
+    --------
+    A folder of pairs
+        rollcli disparity --left cam/left --right cam/right -o maps/
+    At half the size, as floating-point TIFF
+        rollcli disparity --left 'im0*.png' --right 'im1*.png' --downscale 2 --save-as tiff -o maps/
+    A video that holds both views
+        rollcli disparity drive.mp4 --side-by-side -o maps/
     """
     _run(ctx, DisparityOptions(**options))
 
 
 count_options = section(
     "Counting",
-    option(
-        "--bins",
-        Number("N", at_least=1, at_most=65535, whole=True),
-        "Columns of the histogram.  [default: one a pixel of disparity for maps of whole pixels, else "
-        "four; 256 to 1024]",
-    ),
-    option(
-        "--max-disparity",
-        Number("PX", above=0),
-        "Right end of the histogram, pixels; its last bin also holds what lies beyond.  "
-        "[default: just above the map's largest]",
-    ),
-    option(
-        "--counts",
-        FLAG,
-        "Write the counts too, as a 32-bit TIFF beside the picture; a row sums to its valid pixels.",
-    ),
-    option(
-        "--figure",
-        click.Choice(["svg", "pdf", "png"]),
-        "Write a figure for a paper in place of the picture: map and v-disparity, as they are and "
-        "de-rotated, with the road's curve, as wide as a journal's column (3.5 inches).",
-    ),
-    option(
-        "--from",
-        RESULT,
-        "The angles and curves of --figure, from what `rollcli estimate` wrote; matched by stem.  "
-        "[default: estimate them]",
-    ),
+    option("--bins", Number("N", at_least=1, at_most=65535, whole=True)),
+    option("--max-disparity", Number("PX", above=0)),
+    option("--counts", FLAG),
+    option("--figure", click.Choice(["svg", "pdf", "png"])),
+    option("--from", RESULT),
 )
 
 
 @command(
-    examples=[
-        ("Pictures to look at", "rollcli vdisparity maps/ -o vdisparity/"),
-        ("Counts to compute with", "rollcli vdisparity maps/ --counts --max-disparity 128 -o vdisparity/"),
-        ("A figure for a paper", "rollcli vdisparity maps/7.png --figure pdf --from rolls.csv -o figures/"),
-    ]
+    fields=VDisparityOptions,
 )
 @input_options
 @count_options
@@ -175,44 +140,29 @@ def vdisparity(ctx: click.Context, /, **options: Any) -> None:
     middle column is drawn as a dashed curve: on a de-rotated map the road's pixels lie on it. With a
     calibration, the road's horizon on that column is drawn, too. --figure needs the extra:
     pip install "rollcli[report]".
+
+    Examples
+    --------
+    Pictures to look at
+        rollcli vdisparity maps/ -o vdisparity/
+    Counts to compute with
+        rollcli vdisparity maps/ --counts --max-disparity 128 -o vdisparity/
+    A figure for a paper
+        rollcli vdisparity maps/7.png --figure pdf --from rolls.csv -o figures/
     """
     _run(ctx, VDisparityOptions(result=options.pop("from"), **options))
 
 
 @command(
-    examples=[
-        (
-            "Heights in metres over the roads that estimate found, with pictures",
-            "rollcli estimate maps/ --calib calib.txt -o rolls.csv\n"
-            "rollcli heights maps/ --from rolls.csv --calib calib.txt -o heights/ --preview pictures/",
-        ),
-        ("At once, of stereo pairs too", "rollcli estimate maps/ -o rolls.csv --heights heights/"),
-    ]
+    fields=HeightsOptions,
 )
 @input_options
-@option(
-    "--from",
-    RESULT,
-    "The road of each map, from what `rollcli estimate` wrote; matched by stem.",
-    required=True,
-    section="Road",
-)
-@option("--skip-suspect", FLAG, "Leave out the maps whose angle is suspect.", section="Road")
+@option("--from", RESULT, required=True, section="Road")
+@option("--skip-suspect", FLAG, section="Road")
 @output_folder_option
-@option(
-    "--preview",
-    DIR,
-    "Also write pictures of the heights, PNG, every frame in the same colours.",
-    section="Output",
-)
+@option("--preview", DIR, section="Output")
 @heights_range_option
-@option(
-    "--save-as",
-    Choice("tiff", "npy"),
-    "float32 TIFF, whose description names the unit, or float32 NPY.",
-    default="tiff",
-    section="Output",
-)
+@option("--save-as", Choice("tiff", "npy"), section="Output")
 @encoding_options
 @calibration_options
 @cluster_options
@@ -230,5 +180,13 @@ def heights(ctx: click.Context, /, **options: Any) -> None:
     Every map needs its row and every row with an angle its map: what has no partner is an error that names
     it, before anything is written. Suspect angles are used, and a line says how many there are;
     --skip-suspect leaves their maps out.
+
+    Examples
+    --------
+    Heights in metres over the roads that estimate found, with pictures
+        rollcli estimate maps/ --calib calib.txt -o rolls.csv
+        rollcli heights maps/ --from rolls.csv --calib calib.txt -o heights/ --preview pictures/
+    At once, of stereo pairs too
+        rollcli estimate maps/ -o rolls.csv --heights heights/
     """
     _run(ctx, HeightsOptions(result=options.pop("from"), **options))

@@ -8,67 +8,25 @@ from rollcli.cli.command import command, config_option, option
 from rollcli.cli.options import running_options
 from rollcli.cli.types import DIR, FLAG, PATH, Number, OutputFile, Text
 from rollcli.errors import ExitStatus
-from rollcli.report.options import GALLERY, ReportOptions
+from rollcli.report.options import ReportOptions
 
 
 @command(
-    examples=[
-        (
-            "A page from a result; pictures are made from the maps that it names",
-            "rollcli report rolls.csv -o rolls.html",
-        ),
-        (
-            "Pictures as estimate wrote them",
-            "rollcli estimate maps/ -o out/rolls.csv --derotated out/upright --vdisparity out/vdisparity\n"
-            "rollcli report out/rolls.csv --images out -o out/rolls.html",
-        ),
-        ("Several drives, or the shards of one run", "rollcli report monday.csv tuesday.csv -o both.html"),
-        ("Its charts for slides, without a page", "rollcli report rolls.csv --svg slides --png slides"),
-    ],
+    fields=ReportOptions,
     statuses={
         ExitStatus.DONE: "the page and the charts are written",
         ExitStatus.FRAMES_FAILED: "they are written, and pictures of at least one frame cannot be made",
     },
 )
 @click.argument("results", nargs=-1, required=True, type=PATH)
-@option(
-    "-o, --output",
-    OutputFile((".html", ".htm"), "a page (.html)"),
-    "Where the page goes (-: stdout).",
-    section="Page",
-    metavar="FILE.html",
-)
-@option("--title", Text("TEXT"), "Its heading.  [default: Roll of N frames]", section="Page")
-@option(
-    "--images",
-    DIR,
-    "A folder that estimate wrote images to, or the folder above: show these.  [default: make them "
-    "from the inputs]",
-    section="Page",
-)
-@option(
-    "--gallery",
-    Number("N", at_least=0, whole=True),
-    "How many frames to show in pictures: those around jumps, the widest intervals, suspect ones, and "
-    "some evenly spread.",
-    default=GALLERY,
-    section="Page",
-)
-@option(
-    "--fetch",
-    FLAG,
-    "Read inputs from whichever server or bucket the result names; else only from the one it lies in.",
-    section="Page",
-)
-@option(
-    "--svg",
-    DIR,
-    "Write each chart of the page as an SVG: roll, histogram, and where there are any, pitch, height "
-    "and how the right view lies.",
-    section="Charts for slides",
-)
-@option("--pdf", DIR, "The same as PDFs.", section="Charts for slides")
-@option("--png", DIR, "The same as PNGs, 1920 pixels wide.", section="Charts for slides")
+@option("-o, --output", OutputFile((".html", ".htm"), "a page (.html)"), section="Page", metavar="FILE.html")
+@option("--title", Text("TEXT"), section="Page")
+@option("--images", DIR, section="Page")
+@option("--gallery", Number("N", at_least=0, whole=True), section="Page")
+@option("--fetch", FLAG, section="Page")
+@option("--svg", DIR, section="Charts for slides")
+@option("--pdf", DIR, section="Charts for slides")
+@option("--png", DIR, section="Charts for slides")
 @running_options
 @config_option
 @click.pass_context
@@ -82,6 +40,18 @@ def report(ctx: click.Context, /, **options: Any) -> None:
     Inputs are looked for under the names that RESULTS give them, from here or from their folder; remote ones
     only where their result lies on the same server or in the same bucket, or with --fetch. This command needs
     the extra: pip install "rollcli[report]".
+
+    Examples
+    --------
+    A page from a result; pictures are made from the maps that it names
+        rollcli report rolls.csv -o rolls.html
+    Pictures as estimate wrote them
+        rollcli estimate maps/ -o out/rolls.csv --derotated out/upright --vdisparity out/vdisparity
+        rollcli report out/rolls.csv --images out -o out/rolls.html
+    Several drives, or the shards of one run
+        rollcli report monday.csv tuesday.csv -o both.html
+    Its charts for slides, without a page
+        rollcli report rolls.csv --svg slides --png slides
     """
     from rollcli.report.run import run_report
 

@@ -14,42 +14,20 @@ gate_options = record(
     "gates",
     "Checks: exit status 4 when one fails, 5 when none fails and one cannot be told",
     GateOptions,
-    option("--expect-roll", Number("DEG"), "The roll must be this, degrees; with --within."),
-    option("--expect-pitch", Number("DEG"), "The pitch must be this, degrees; with --within."),
-    option("--expect-height", Number("M"), "The height must be this, metres."),
-    option(
-        "--within",
-        Number("DEG", at_least=0),
-        "How far from what is expected it may be, degrees; of a height metres.",
-    ),
-    option(
-        "--within-height",
-        Number("M", at_least=0),
-        "How far the height may be from what is expected, metres; else as --within.",
-    ),
-    option("--max-drift", Number("DEG", at_least=0), "Largest drift of the roll over a drive, degrees."),
-    option("--max-jump", Number("DEG", at_least=0), "Largest jump of the roll, degrees."),
-    option(
-        "--max-misalignment",
-        Number("PX", at_least=0),
-        "Largest vertical shift between the views of a pair anywhere in the image, pixels.",
-    ),
-    option(
-        "--min-ok", Number("SHARE", at_least=0, at_most=1), "Least share of the frames that are ok, 0 to 1."
-    ),
+    option("--expect-roll", Number("DEG")),
+    option("--expect-pitch", Number("DEG")),
+    option("--expect-height", Number("M")),
+    option("--within", Number("DEG", at_least=0)),
+    option("--within-height", Number("M", at_least=0)),
+    option("--max-drift", Number("DEG", at_least=0)),
+    option("--max-jump", Number("DEG", at_least=0)),
+    option("--max-misalignment", Number("PX", at_least=0)),
+    option("--min-ok", Number("SHARE", at_least=0, at_most=1)),
 )
 
 
 @command(
-    examples=[
-        ("How the rig is mounted, and whether it has moved", "rollcli rig rolls.csv"),
-        (
-            "A gate for CI: status 4 when the rig has come loose, or when a map has no angle",
-            "rollcli rig rolls.csv --expect-roll 0 --within 0.5 --max-jump 0.3 --min-ok 0.9",
-        ),
-        ("The shards of one run, in any order", "rollcli rig part1.csv part2.csv part3.csv"),
-        ("Has it moved since?", "rollcli rig before.csv --against after.csv"),
-    ],
+    fields=RigOptions,
     statuses={
         ExitStatus.DONE: "the rig is assessed, and every check holds",
         ExitStatus.CHECK_FAILED: "at least one check has failed; a line for each says which frames",
@@ -57,32 +35,12 @@ gate_options = record(
     },
 )
 @click.argument("results", nargs=-1, required=True, type=PATH)
-@option("--against", FILE, "A later result: say how far the rig has moved until then.", section="Assessment")
-@option("--include-suspect", FLAG, "Let suspect frames count too.", section="Assessment")
-@option(
-    "--groups",
-    Text("GLOB|none"),
-    "Folders that are one drive each, such as 'data/run*'; none: all frames are one drive; auto: each "
-    "folder is a drive, unless folders hold hardly a frame.",
-    default="auto",
-    section="Assessment",
-)
-@option("-o, --output", TABLE_FILE, "Where it goes (-: stdout).", default="-", section="Assessment")
-@option(
-    "--format",
-    Choice(*TABLE_FORMATS),
-    "A table to read, or for programs; csv has a line for each segment, from one jump to the next.  "
-    "[default: by FILE's ending, else table]",
-    section="Assessment",
-)
-@option(
-    "--correction",
-    FILE,
-    "Also write how the right view of the pairs has to be corrected: JSON with the numbers, a 3x3 "
-    "matrix and the OpenCV call, for `estimate --align FILE`. Up to 24 of the pairs are matched again, to "
-    "tell what of a scale is in the columns.",
-    section="Assessment",
-)
+@option("--against", FILE, section="Assessment")
+@option("--include-suspect", FLAG, section="Assessment")
+@option("--groups", Text("GLOB|none"), section="Assessment")
+@option("-o, --output", TABLE_FILE, section="Assessment")
+@option("--format", Choice(*TABLE_FORMATS), default=None, section="Assessment")
+@option("--correction", FILE, section="Assessment")
 @calibration_options
 @gate_options
 @running_options
@@ -95,6 +53,17 @@ def rig(ctx: click.Context, /, **options: Any) -> None:
     95 % intervals allow for as much of that as the frames do, and there is one from 8 frames on. Suspect
     frames are counted and not used. After a jump, the roll is that of the frames since, and with a drift
     that at the end: of the rig as it is now.
+
+    Examples
+    --------
+    How the rig is mounted, and whether it has moved
+        rollcli rig rolls.csv
+    A gate for CI: status 4 when the rig has come loose, or when a map has no angle
+        rollcli rig rolls.csv --expect-roll 0 --within 0.5 --max-jump 0.3 --min-ok 0.9
+    The shards of one run, in any order
+        rollcli rig part1.csv part2.csv part3.csv
+    Has it moved since?
+        rollcli rig before.csv --against after.csv
     """
     from rollcli.run.rig import run_rig
 

@@ -11,16 +11,18 @@ class AccuracyOptions:
 
     Attributes
     ----------
-    result, truth : str
-        Files: what `rollcli estimate` wrote, and a CSV with `file`, `roll_deg` and, where known, `pitch_deg`
-        and `height_m`.
+    result : str
+        What `rollcli estimate` wrote.
+    truth : str
+        The known angles: CSV with the columns file and roll_deg, degrees.
     heights : str or None
-        The folder of heights over the road that the run wrote; None: the one that its record names, if it and
-        `heights/` beside the truth exist.
+        Heights over the road that estimate wrote, compared with heights/ beside the known angles at 5, 10
+        and 20 m. [default: where the run of RESULT wrote them, if both exist]
     output : str
-        A file, or "-" for stdout.
+        Where the figures go (-: stdout).
     format : {"table", "csv", "json"}
-    running : RunningOptions
+        A table to read, or degrees and shares from 0 to 1 for programs. [default: by FILE's ending, else
+        table]
     """
 
     result: str
@@ -38,15 +40,15 @@ class ExperimentOptions:
     Attributes
     ----------
     output : str
-        A folder.
+        Where paper.html and its CSVs go.
     turns : tuple of float
-        First and last angle that maps are rotated by, and the step; degrees.
+        Rotate each map by these angles, degrees.
     timed : int
-        How many maps, from the first, the run times are taken on.
+        Take the run times on the first N maps; the paper's n x 3 form is slow.
     truth : str or None
-        A CSV of known angles.
+        Known angles of the maps: CSV with file and roll_deg. [default: each map's own estimate]
     figure : str or None
-        The kind of the figures for a paper: "svg", "pdf" or "png".
+        Write each chart of the page as a figure, too, as wide as a journal's column (3.5 inches).
     """
 
     output: str

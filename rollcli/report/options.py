@@ -4,16 +4,34 @@ from dataclasses import dataclass, field
 
 from rollcli.run.options import RunningOptions
 
-GALLERY = 12
-
 
 @dataclass(frozen=True)
 class ReportOptions:
     """Everything that `rollcli report` was asked.
 
-    `results` are one result, the shards of one run, or results of several; `output` is the page, `svg`, `pdf`
-    and `png` are folders for its charts; `gallery` is how many frames the page shows in pictures; `fetch`
-    follows rows to any store.
+    Attributes
+    ----------
+    results : tuple of str
+        One result, the shards of one run, or results of several.
+    output : str or None
+        Where the page goes (-: stdout).
+    svg : str or None
+        Write each chart of the page as an SVG: roll, histogram, and where there are any, pitch, height
+        and how the right view lies.
+    pdf : str or None
+        The same as PDFs.
+    png : str or None
+        The same as PNGs, 1920 pixels wide.
+    images : str or None
+        A folder that estimate wrote images to, or the folder above: show these. [default: make them from
+        the inputs]
+    title : str or None
+        Its heading. [default: Roll of N frames]
+    gallery : int
+        How many frames to show in pictures: those around jumps, the widest intervals, suspect ones, and
+        some evenly spread.
+    fetch : bool
+        Read inputs from whichever server or bucket the result names; else only from the one it lies in.
     """
 
     results: tuple[str, ...]
@@ -23,7 +41,7 @@ class ReportOptions:
     png: str | None = None
     images: str | None = None
     title: str | None = None
-    gallery: int = GALLERY
+    gallery: int = 12
     fetch: bool = False
     running: RunningOptions = field(default_factory=RunningOptions)
 

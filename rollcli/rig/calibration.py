@@ -10,8 +10,19 @@ from rollcli.errors import UsageError
 class CalibrationOptions(NamedTuple):
     """Files and numbers of the calibration; each number wins over the files.
 
-    `calib` names a file, a folder, or the left and the right file of ROS; `focal` and `doffs` are in px,
-    `principal_point` is (cx, cy) in px, `baseline` in metres.
+    Attributes
+    ----------
+    calib : tuple of str
+        A file, or a folder with one of the same stem each: KITTI, Middlebury, ETH3D, OpenCV, ROS (twice:
+        left, right), Cityscapes, ORB-SLAM, DrivingStereo; recognised by content.
+    focal : float or None
+        Focal length, pixels. [default: the file's]
+    principal_point : tuple of float or None
+        Optical axis in the left view, from the centre of the top-left pixel. [default: the file's]
+    baseline : float or None
+        Distance between the cameras, metres; gives the height. [default: the file's]
+    doffs : float or None
+        CX of the right view less that of the left one, pixels. [default: the file's, else 0]
     """
 
     calib: tuple[str, ...] = ()

@@ -32,13 +32,10 @@ class ImageKind(NamedTuple):
     holds : str
         "picture": an 8-bit PNG to look at; "map": disparities as `--save-as` says; "as input": the same, but
         in the input's own type and format where that is a map; "numbers": float32, TIFF or NPY.
-    help : str
-        Of its option.
     """
 
     name: str
     holds: Literal["picture", "map", "as input", "numbers"]
-    help: str
 
     def endings(self, save_as: Save, *, computed: bool) -> tuple[str | None, ...]:
         """Return the endings that its files may have, the usual one first; None for that of the input.
@@ -56,26 +53,12 @@ class ImageKind(NamedTuple):
 
 
 KINDS = (
-    ImageKind("derotated", "as input", "The map rotated upright; type and format of the input."),
-    ImageKind(
-        "vdisparity",
-        "picture",
-        "v-disparity of the map rotated upright, with the road, PNG; vdisparity draws maps as they are.",
-    ),
-    ImageKind("disparity", "map", "The disparity map that was computed from a pair."),
-    ImageKind("road_mask", "picture", "The found road, drawn on the left image of a pair or the map, PNG."),
-    ImageKind(
-        "heights",
-        "numbers",
-        "Heights over the road, float32 TIFF (--save-as npy: NPY): metres with a calibration that has a "
-        "baseline, else camera heights; NaN where there is no disparity.",
-    ),
-    ImageKind(
-        "heights_preview",
-        "picture",
-        "Heights over the road to look at, over the left image of a pair, PNG; every frame in the same "
-        "colours.",
-    ),
+    ImageKind("derotated", "as input"),
+    ImageKind("vdisparity", "picture"),
+    ImageKind("disparity", "map"),
+    ImageKind("road_mask", "picture"),
+    ImageKind("heights", "numbers"),
+    ImageKind("heights_preview", "picture"),
 )
 
 Layout = Literal["left-right", "top-bottom"]
@@ -83,7 +66,26 @@ HEIGHTS_RANGE = (-0.10, 0.10)
 
 
 class InputOptions(NamedTuple):
-    """Which maps to read."""
+    """Which maps to read.
+
+    Attributes
+    ----------
+    files_from : str or None
+        Read further inputs from FILE, one a line (-: stdin).
+    recursive : bool
+        Search folders recursively.
+    include : tuple of str
+        Take only files that match. Repeatable.
+    exclude : tuple of str
+        Leave out files that match. Repeatable.
+    sorted : bool
+        The names of --files-from are sorted already (frame2 before frame10) and name one map each: they
+        are read as they are needed, so that a hundred million take no memory.
+    topic : str or None
+        The disparity or depth maps of a bag. [default: the only topic that fits]
+    every : int
+        Take every N-th frame of what is found.
+    """
 
     inputs: tuple[str, ...] = ()
     files_from: str | None = None
@@ -96,7 +98,20 @@ class InputOptions(NamedTuple):
 
 
 class PairOptions(NamedTuple):
-    """Which stereo pairs to read, instead of maps. `side_by_side`: how each input holds both views."""
+    """Which stereo pairs to read, instead of maps.
+
+    Attributes
+    ----------
+    left : str or None
+        Left images: a file, folder, quoted pattern, or a video.
+    right : str or None
+        Right images, or a video of as many frames.
+    match : {"name", "order"}
+        By name (the same but for left/right, l/r, L1/R1, image_2/image_3, im0/im1 …), or by order.
+    side_by_side : str or None
+        INPUTS are images, or videos (.mp4, .avi, .mkv, .mov), that hold both views; left-right unless the
+        word is given.
+    """
 
     left: str | None = None
     right: str | None = None
@@ -105,7 +120,17 @@ class PairOptions(NamedTuple):
 
 
 class TopicOptions(NamedTuple):
-    """Which views of a bag make pairs, and how far apart their header stamps may be, ms."""
+    """Which views of a bag make pairs.
+
+    Attributes
+    ----------
+    left_topic : str or None
+        Left views of the bag that INPUTS name.
+    right_topic : str or None
+        Right views of the bag that INPUTS name.
+    sync_tolerance : float
+        How far apart the header stamps of a pair may be, milliseconds.
+    """
 
     left_topic: str | None = None
     right_topic: str | None = None
@@ -113,7 +138,21 @@ class TopicOptions(NamedTuple):
 
 
 class EncodingOptions(NamedTuple):
-    """How stored numbers become pixels of disparity."""
+    """How stored numbers become pixels of disparity.
+
+    Attributes
+    ----------
+    encoding : str
+        px: pixels as they are; kitti: p/256; cityscapes: (p-1)/256; sgbm: p/16, negative is no data;
+        depth: metres (whole numbers: millimetres), which a calibration turns into disparities;
+        foundationstereo: (R*255*255 + G*255 + B)/1000 of an RGB PNG; auto: float and uint8 are px, uint16
+        is kitti, int16 is sgbm.
+    scale : float or None
+        Pixels = stored number * F (depth: metres = stored number * F); F replaces the factor of an
+        encoding, and is negative where maps are stored negative.
+    invalid : tuple of float
+        A further stored value that means no data (always: nan, inf, <= 0). Repeatable.
+    """
 
     encoding: str = "auto"
     scale: float | None = None
@@ -121,7 +160,17 @@ class EncodingOptions(NamedTuple):
 
 
 class RegionOptions(NamedTuple):
-    """Which pixels may be used. `roi` is (x0, y0, x1, y1) in pixels, x1 and y1 excluded."""
+    """Which pixels may be used.
+
+    Attributes
+    ----------
+    mask : str or None
+        Use only non-zero pixels: one mask for all, or a folder with one of the same stem each.
+    roi : tuple of int or None
+        Use only this rectangle, pixels; X1 and Y1 are the first left out.
+    polygon : tuple of (float, float), or None
+        Use only the inside of these corners, pixels.
+    """
 
     mask: str | None = None
     roi: tuple[int, int, int, int] | None = None
@@ -129,7 +178,26 @@ class RegionOptions(NamedTuple):
 
 
 class MethodOptions(NamedTuple):
-    """How the angle is found; `rollcli.estimator.request` has the names."""
+    """How the angle is found; `rollcli.estimator.request` has the names.
+
+    Attributes
+    ----------
+    model : str
+        Disparity of the road as a function of the row.
+    road : str
+        auto: find the road first; all: use every valid pixel, as the paper does.
+    lambda0 : float or "auto"
+        First learning rate of gd, rad^2 per unit of energy; auto: 1 / curvature of the energy.
+    tolerance_deg : float
+        Stop when the angle moves by less than this, degrees.
+    max_roll_deg : float
+        Largest |roll| that road finding considers, degrees.
+    max_interval_deg : float
+        An angle is suspect when the half-width of its 95 % interval is above this, or when noise and
+        unevenness alone make 0.45 of this, degrees.
+    seed : int
+        Seed of road finding's samples.
+    """
 
     method: str = "gd"
     model: str = "parabola"
@@ -152,7 +220,26 @@ class MethodOptions(NamedTuple):
 class ImageOptions(NamedTuple):
     """Which images to write, each of `KINDS` into a folder of its own.
 
-    `heights_range` is what has the outermost colours of a preview, lowest first, in the heights' unit.
+    Attributes
+    ----------
+    derotated : str or None
+        The map rotated upright; type and format of the input.
+    vdisparity : str or None
+        v-disparity of the map rotated upright, with the road, PNG; vdisparity draws maps as they are.
+    disparity : str or None
+        The disparity map that was computed from a pair.
+    road_mask : str or None
+        The found road, drawn on the left image of a pair or the map, PNG.
+    heights : str or None
+        Heights over the road, float32 TIFF (--save-as npy: NPY): metres with a calibration that has a
+        baseline, else camera heights; NaN where there is no disparity.
+    heights_preview : str or None
+        Heights over the road to look at, over the left image of a pair, PNG; every frame in the same
+        colours.
+    heights_range : tuple of float
+        Heights with the outermost colours of a preview, A:B, metres or camera heights.
+    save_as : {"png", "tiff", "npy"}
+        Of maps and heights.
     """
 
     derotated: str | None = None
@@ -177,7 +264,20 @@ class ImageOptions(NamedTuple):
 class RunningOptions(NamedTuple):
     """How the program runs and how much it says.
 
-    `jobs` None: the usable processors. `scheduler`: the address of a Dask cluster to run on instead.
+    Attributes
+    ----------
+    jobs : int or None
+        Worker processes. [default: the usable processors]
+    scheduler : str or None
+        Run on this Dask cluster: its scheduler's address, such as tcp://host:8786, or scheduler file.
+    overwrite : bool
+        Replace results and images that are there.
+    dry_run : bool
+        List what would be read and written, and do nothing.
+    quiet : bool
+        Say nothing but errors on stderr.
+    verbose : bool
+        Say more on stderr.
     """
 
     jobs: int | None = None
@@ -229,6 +329,31 @@ class ResultOptions(NamedTuple):
 
     `shard` is (I, N), I from 1: every N-th frame, or one of N runs of consecutive ones, as `shard_by` says.
     An `update` is a `resume` as well.
+
+    Attributes
+    ----------
+    output : str
+        Where the rows go (-: stdout).
+    format : str or None
+        CSV, JSON Lines, or Parquet (a folder of parts). [default: by FILE's ending, else csv]
+    resume : bool
+        Keep the rows of an interrupted run and do the rest.
+    update : bool
+        As --resume, also of a whole result: do the frames again whose content has changed, add new ones,
+        and leave out those that are gone.
+    retry_failed : bool
+        With --resume or --update: do the frames again whose rows are error, such as those of files mended
+        since.
+    shard : tuple of int
+        Take every N-th frame from the I-th.
+    shard_by : {"every", "range"}
+        every: --shard takes every N-th frame; range: the I-th of N runs of consecutive frames.
+    fail_fast : bool
+        Stop at the first frame that fails.
+    timing : bool
+        Add the column elapsed_ms: milliseconds spent on the frame.
+    part_rows : int
+        Rows of each part, of Parquet and of results in an object store.
     """
 
     output: str = "-"
@@ -291,9 +416,11 @@ class ConvertOptions(ABC):
     ----------
     inputs : InputOptions
     output : str
-        The folder of what is written.
+        Where the files go, named after their input; folders below the named ones are kept.
     running : RunningOptions
-    encoding, calibration
+    encoding : EncodingOptions
+        How maps are read.
+    calibration : CalibrationOptions
         How maps are read.
     result : str or None
         Has the row of each map.
@@ -323,7 +450,21 @@ class ConvertOptions(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class DerotateOptions(ConvertOptions):
-    """Every option of `rollcli derotate`. `roll_deg` is one angle for all maps, in place of a result."""
+    """Every option of `rollcli derotate`: one angle for all maps, or a result with one of each.
+
+    Attributes
+    ----------
+    roll_deg : float or None
+        Of the rig, for every map, degrees; positive: its right end is up.
+    expand : bool
+        Enlarge the maps so that their corners are kept.
+    save_matrix : bool
+        Beside each map write NAME.txt: the 3x3 matrix that takes its pixels to the new ones.
+    result : str or None
+        The angle of each map, from what `rollcli estimate` wrote; matched by stem.
+    skip_suspect : bool
+        With --from, leave out the maps whose angle is suspect.
+    """
 
     roll_deg: float | None = None
     expand: bool = False
@@ -337,7 +478,19 @@ class DerotateOptions(ConvertOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class HeightsOptions(ConvertOptions):
-    """Every option of `rollcli heights`."""
+    """Every option of `rollcli heights`.
+
+    Attributes
+    ----------
+    result : str
+        The road of each map, from what `rollcli estimate` wrote; matched by stem.
+    preview : str or None
+        Also write pictures of the heights, PNG, every frame in the same colours.
+    save_as : {"tiff", "npy"}
+        float32 TIFF, whose description names the unit, or float32 NPY.
+    skip_suspect : bool
+        Leave out the maps whose angle is suspect.
+    """
 
     result: str
     preview: str | None = None
@@ -355,7 +508,22 @@ class HeightsOptions(ConvertOptions):
 class VDisparityOptions(ConvertOptions):
     """Every option of `rollcli vdisparity`: how disparities are counted, None: chosen for each map.
 
-    `figure` is the kind of a figure for a paper, in place of the picture: "svg", "pdf" or "png".
+    Attributes
+    ----------
+    bins : int or None
+        Columns of the histogram. [default: one a pixel of disparity for maps of whole pixels, else four;
+        256 to 1024]
+    max_disparity : float or None
+        Right end of the histogram, pixels; its last bin also holds what lies beyond. [default: just above
+        the map's largest]
+    counts : bool
+        Write the counts too, as a 32-bit TIFF beside the picture; a row sums to its valid pixels.
+    figure : str or None
+        Write a figure for a paper in place of the picture: map and v-disparity, as they are and
+        de-rotated, with the road's curve, as wide as a journal's column (3.5 inches).
+    result : str or None
+        The angles and curves of --figure, from what `rollcli estimate` wrote; matched by stem. [default:
+        estimate them]
     """
 
     bins: int | None = None
@@ -373,7 +541,13 @@ class VDisparityOptions(ConvertOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class DisparityOptions(ConvertOptions):
-    """Every option of `rollcli disparity`."""
+    """Every option of `rollcli disparity`.
+
+    Attributes
+    ----------
+    preview : str or None
+        Also write each map as a picture to look at, in colour with a scale in pixels, PNG.
+    """
 
     pairs: PairOptions
     topics: TopicOptions = field(default_factory=TopicOptions)
@@ -402,20 +576,24 @@ class GateOptions:
 
     Attributes
     ----------
-    expect_roll, expect_pitch : float or None
-        Degrees.
+    expect_roll : float or None
+        The roll must be this, degrees; with --within.
+    expect_pitch : float or None
+        The pitch must be this, degrees; with --within.
     expect_height : float or None
-        Metres.
+        The height must be this, metres.
     within : float or None
-        How far from them the rig may be, degrees; of the height metres, unless `within_height` is given.
+        How far from what is expected it may be, degrees; of a height metres.
     within_height : float or None
-        Metres.
-    max_drift, max_jump : float or None
-        Of the roll, degrees; the drift over a drive.
+        How far the height may be from what is expected, metres; else as --within.
+    max_drift : float or None
+        Largest drift of the roll over a drive, degrees.
+    max_jump : float or None
+        Largest jump of the roll, degrees.
     max_misalignment : float or None
-        Largest vertical shift between the views in the image, px.
+        Largest vertical shift between the views of a pair anywhere in the image, pixels.
     min_ok : float or None
-        Share of the frames that are ok, 0 to 1.
+        Least share of the frames that are ok, 0 to 1.
     """
 
     expect_roll: float | None = None
@@ -438,17 +616,24 @@ class RigOptions:
     results : tuple of str
         One result or several, or the shards of one run.
     against : str or None
-        A later result to compare with.
+        A later result: say how far the rig has moved until then.
     include_suspect : bool
+        Let suspect frames count too.
     groups : str
-        "auto", "none" or a pattern of folders.
-    output, format : str
+        Folders that are one drive each, such as 'data/run*'; none: all frames are one drive; auto: each
+        folder is a drive, unless folders hold hardly a frame.
+    output : str
+        Where it goes (-: stdout).
+    format : str
+        A table to read, or for programs; csv has a line for each segment, from one jump to the next.
+        [default: by FILE's ending, else table]
     correction : str or None
-        Where to write how the right view has to be corrected.
+        Also write how the right view of the pairs has to be corrected: JSON with the numbers, a 3x3
+        matrix and the OpenCV call, for `estimate --align FILE`. Up to 24 of the pairs are matched again,
+        to tell what of a scale is in the columns.
     calibration : CalibrationOptions
         For what a misalignment does to depth.
     gates : GateOptions
-    running : RunningOptions
     """
 
     results: tuple[str, ...]

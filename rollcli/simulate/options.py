@@ -27,21 +27,25 @@ class Rendering:
     Attributes
     ----------
     roughness : str or None
-        The class of ISO 8608, one of `ROUGHNESS`; None: a smooth road.
+        Class of the road's unevenness by ISO 8608, along and across, with mended patches and sunken
+        tracks; A: new asphalt, C: an old road, E: gravel. Roll, pitch and height are against the plane
+        that fits the lane ahead. [default: a smooth road]
     dips : int or None
-        How many dips and bumps the lane ahead has, as far as there is room; None: none, and no true heights.
+        Dips and bumps of 2.5 to 7 cm in the lane ahead of each road, and DIR/heights: how high the ground
+        lies over the road, metres, float32 TIFF; 0: kerbs and pavements alone. [default: neither]
     size : tuple of int
-        Width and height, pixels.
+        Size of the images, pixels.
     principal_point : tuple of float or None
-        Column and row, pixels from the centre of the top-left pixel; None: the image's centre.
+        Column and row of the principal point, pixels from the centre of the top-left pixel. [default: the
+        image's centre]
     baseline : float
-        Metres.
+        Distance of the cameras, metres.
     noise : float
-        Standard deviation of the sensor's noise, grey levels of 255.
+        Noise of the sensor: standard deviation in grey levels of 255.
     gain : float
         Brightness of the right view relative to the left one.
     seed : int
-        The random content is drawn from this and the frame's number.
+        Seed of the random numbers; the same seed gives the same files.
     """
 
     roughness: str | None = None
@@ -63,17 +67,24 @@ class SimulateOptions(Rendering):
     frames : int
         Number of pairs.
     scene : str
-        One of `SCENES`, or ``mixed``: each frame draws one of them.
-    roll_deg, pitch_deg : tuple of float
-        Lowest and highest angle, degrees; drawn evenly, as are all ranges.
+        bare: a road alone; open: with kerbs and cars; street: with house fronts too; verge: between grass
+        slopes; mixed: each frame one of these.
+    roll_deg : tuple of float
+        Roll of the rig against the road, degrees, drawn evenly from A to B; positive: its right end is
+        up.
+    pitch_deg : tuple of float
+        Pitch of the rig against the road, degrees, drawn evenly from A to B; positive: it looks down.
     curvature : tuple of float or None
-        Lowest and highest vertical curvature, 1/m. None: ``bare`` is flat, in the other scenes every second
-        frame is flat and the others lie within +-0.001 (a radius of 1 km).
+        Curvature along the road, 1/m, drawn evenly from A to B; positive: a sag; negative: a crest.
+        [default: half of the frames flat, half within +-0.001; bare is flat]
     bend : tuple of float or None
-        Lowest and highest horizontal curvature, 1/m. None: ``bare`` is straight, in the other scenes on
-        average every second road is straight and the others lie within +-0.004 (a radius of 250 m).
+        Horizontal curvature of the road, 1/m, drawn evenly from A to B; positive: to the right; 0: a
+        straight road. [default: half of the roads straight, half within +-0.004; bare is straight]
     cross_section : str
-        One of `CROSS_SECTIONS`, or ``mixed``: each frame draws one of them.
+        Shape of the road across. crown, dish: a parabola, highest or lowest in the middle; roof: two
+        planes that meet in the middle; superelevated: one plane, its outer side up in a bend; mixed: each
+        frame one of these. Roll and pitch are against the plane tangent to the road below the left
+        camera.
     crossfall : tuple of float or None
         Lowest and highest slope, per cent; None: `CROSSFALL`. Flat roads have none.
     gutter : tuple of float
@@ -83,11 +94,11 @@ class SimulateOptions(Rendering):
     focal : float or None
         Pixels; None: `FOCAL_PER_WIDTH` times the width.
     principal_offset : tuple of float
-        Lowest and highest offset of the principal point in each direction, pixels.
+        Offset of the principal point in each direction, pixels, drawn evenly from A to B.
     height : tuple of float
-        Lowest and highest height of the left camera, metres.
+        Height of the left camera above the road, metres, drawn evenly from A to B.
     grey : bool
-        One channel instead of three.
+        Write grey images. [default: colour]
     resume : bool
         Keep the frames of an interrupted simulation and do the rest.
     """

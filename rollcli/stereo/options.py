@@ -30,26 +30,26 @@ class StereoOptions:
     num_disparities : int or None
         Width of the range searched, rounded up to a multiple of 16; None: found from the pair itself.
     min_disparity : int
-        Where the range starts.
+        Smallest disparity searched, pixels.
     block_size : int
-        Side of the matched block, odd.
+        Side of the matched block, pixels, odd.
     mode : {"3way", "sgbm", "hh"}
-        OpenCV's variants: three directions (fast, and on real roads the nearest to lidar), five, eight (slow,
-        much memory).
+        OpenCV's variants: three directions (fast, and on real roads the nearest to lidar), five, eight
+        (slow, much memory).
     uniqueness : int
-        Per cent by which the best match must win.
+        Margin by which the best match must win, percent.
     speckle_size : int
-        Smaller islands of disparity are removed, pixels; 0 keeps all.
+        Drop patches of up to this many pixels; 0: keep all.
     speckle_range : int
-        Disparity step that ends an island, pixels.
+        Disparity step within a patch, pixels.
     downscale : float
         Match at 1/downscale of the size.
     align : {"auto", "off"} or str
         Whether to measure how the right view lies against the left one, and to level it; or the file of a
         correction for all pairs.
     vertical_offset : float or None
-        How much lower the right image lies, pixels of the size matched at: corrected as given, and nothing is
-        measured; None: as `align` says.
+        How much lower the right image lies, pixels of the size matched at: corrected as given, and
+        nothing is measured; None: as `align` says.
     """
 
     num_disparities: int | None = None
