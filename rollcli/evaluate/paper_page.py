@@ -166,9 +166,6 @@ def all_tables(
     }
 
 
-_SHOWN = 50  # maps in the page's own list; the CSV has all
-
-
 def paper_page(
     tables: Mapping[str, Table],
     charts: "Mapping[str, Drawing]",
@@ -181,96 +178,16 @@ def paper_page(
     return render_page(
         "rollcli.evaluate",
         "paper.html",
-        title=f"The paper's experiments on {_count(len(found), 'map')}",
+        title=f"The paper's experiments on {len(found)} map{'' if len(found) == 1 else 's'}",
         version=__version__,
-        deltas=[f"{delta:g}°" for delta in DELTAS_DEG],
+        deltas=DELTAS_DEG,
+        solvers=SOLVER_NAMES,
+        methods=METHOD_NAMES,
+        tables=tables,
         charts=charts,
-        iterations=_iterations(tables["table1_iterations"]),
-        runtimes=_runtimes(tables["table2_runtime"]),
-        methods=_methods(tables["methods_accuracy"]),
-        maps=[_map(each) for each in found[:_SHOWN]],
-        more_maps=max(0, len(found) - _SHOWN),
+        found=found,
         failed=failed,
-        timed=_count(len(times), "map"),
-        timed_pixels=f"{np.mean([each.pixels for each in times]):,.0f}",
-        ratio=f"{min(column(tables['table2_runtime'], 'textbook_over_moments')):,.0f}",
-        turns=_turns(options),
-        truth=options.experiments.truth,
+        times=times,
+        options=options.experiments,
         region=options.has_region,
     )
-
-
-def _turns(options: PaperOptions) -> str:
-    angles, step = options.experiments.turns_deg, options.experiments.turns[2]
-    if len(angles) == 1:
-        return _degrees(angles[0])
-    return f"{_degrees(angles[0])} to {_degrees(angles[-1])} in steps of {_degrees(step)}"
-
-
-def _degrees(angle: float, digits: str = "g") -> str:
-    return f"{angle:{digits}}°".replace("-", "−")
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" + ("" if number == 1 else "s")
-
-
-def _iterations(table: Table) -> list[tuple[str, list[str], list[str]]]:
-    """Return name, the paper's column and ours, for each solver."""
-    lines = []
-    for solver in PAPER_ITERATIONS:
-        rows = [row for row in table if row["solver"] == solver]
-        ours = [
-            f"{row['mean']:g}"
-            if row["min"] == row["max"]
-            else f"{row['mean']:.2f} ({row['min']}–{row['max']})"
-            for row in rows
-        ]
-        lines.append((SOLVER_NAMES[solver], [str(row["paper"]) for row in rows], ours))
-    return lines
-
-
-def _runtimes(table: Table) -> list[tuple[str, str, list[str]]]:
-    """Return solver, form, and a time for each delta."""
-    forms = {
-        "paper_s": "paper, Matlab 2019a on an i7-8700K",
-        "textbook_s": "here, the paper's n × 3 form",
-        "with_pass_s": "here, moments with the pass over the map",
-        "moments_s": "here, moments alone",
-    }
-    return [
-        (SOLVER_NAMES[solver], form, list(map(_duration, column(table, name, solver=solver))))
-        for solver in PAPER_SECONDS
-        for name, form in forms.items()
-    ]
-
-
-def _methods(table: Table) -> list[tuple[str, ...]]:
-    """Return name, mean, median, 95th percentile, worst, and how many rotated maps had no angle."""
-    return [
-        (
-            METHOD_NAMES[str(method)],
-            *("–" if value is None else f"{value:.5f}°" for value in figures),
-            f"{missing}",
-        )
-        for method, *figures, _, missing in (row.values() for row in table)
-    ]
-
-
-def _map(found: Findings) -> dict[str, Any]:
-    return {
-        "file": found.file,
-        "size": f"{found.width}×{found.height}",
-        "valid": f"{100 * found.pixels / (found.width * found.height):.0f} %",
-        "theta": _degrees(math.degrees(found.theta), ".4f"),
-        "gss": " ".join(map(str, found.gss)),
-        "gd": " ".join(map(str, found.gd)),
-    }
-
-
-def _duration(seconds: float) -> str:
-    """Return three digits, in the unit that suits."""
-    for unit, size in (("s", 1.0), ("ms", 1e-3)):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds / 1e-6:.3g} µs"
