@@ -28,9 +28,6 @@ from rollcli.rig.words import answer, counts, decimals, findings, now_in_words
 from rollcli.run.resume import recorded_calibrations, recorded_options
 from rollcli.run.rig_gates import NOT_SEEN, Health, health_of
 
-_FOLDERS = 6  # of inputs that the summary names
-_LISTED = 20  # doubtful frames in a list of their own; the table has all
-
 
 def report_page(
     result: Result,
@@ -41,7 +38,6 @@ def report_page(
 ) -> bytes:
     """Return the page, HTML, UTF-8."""
     rows, run, summary = result.rows, result.run or {}, summarize(result.rows)
-    folders = input_folders(rows)
     doubtful = sorted(
         ((number, row) for number, row in enumerate(rows, 1) if row.status != "ok"),
         key=lambda each: each[1].status,  # errors before suspects
@@ -58,14 +54,12 @@ def report_page(
         degrees=degrees,
         with_interval=with_interval,
         decimals=decimals,
-        folders=folders[:_FOLDERS],
-        more_folders=len(folders) - _FOLDERS,
+        folders=input_folders(rows),
         written=max(map(written_at, options.results)),
         options=option_lines(result.run),
         encodings=", ".join(map(str, run["encoding"])) if isinstance(run.get("encoding"), list) else "",
         charts={name: with_still(chart) for name, chart in charts.items()},
         answer=answer(rig.now()).replace("-", "−"),
-        drawn={trace["name"] for trace in charts["roll"].data},
         now=now_in_words(rig),
         others=_others(rig),
         counts=counts(rig),
@@ -73,10 +67,9 @@ def report_page(
         not_seen=NOT_SEEN,
         findings=findings(rig) or ["Neither a jump nor a drift is seen."],
         outside=outside(rows),
-        doubtful=doubtful[:_LISTED],
-        more_doubtful=max(0, len(doubtful) - _LISTED),
+        doubtful=doubtful,
         rows=_table(rows, rig),
-        gallery=[_card(place, rows[place], reason, pictures) for (place, reason), pictures in shown],
+        gallery=[(place + 1, rows[place], reason, pictures) for (place, reason), pictures in shown],
         angled=frame_count(sum(row.roll_deg is not None for row in rows)),
     )
 
@@ -118,31 +111,3 @@ def _table(rows: Sequence[Row], rig: RigAssessment) -> str:
         for number, row in enumerate(rows, 1)
     ]
     return script_json({"rows": lines, "places": frame_axis(rows, rig).places})
-
-
-def _card(place: int, row: Row, reason: str, pictures: Pictures) -> dict[str, Any]:
-    roll = degrees(row.roll_deg, decimals(row.roll_ci95_deg))
-    turned, above = f"de-rotated by {roll}", "Heights over the road"
-    level = "v-disparity, de-rotated", "v-disparity once de-rotated"
-    return {
-        "number": place + 1,
-        "row": row,
-        "roll": roll,
-        "reason": reason,
-        "missing": pictures.missing,
-        "empty": pictures.empty,
-        "show": "before" if pictures.map else "after",
-        "heights": pictures.heights is not None,
-        "columns": [
-            [
-                ("", "Left image, the found road tinted", "road on the left image", pictures.road, ""),
-                ("before", "Map", "map", pictures.map, pictures.missing),
-                ("after", f"Map, {turned}", f"map {turned}", pictures.level, "Map, de-rotated: not there"),
-                ("heights", above, above.lower(), pictures.heights, f"{above}: not there"),
-            ],
-            [
-                ("before", "v-disparity", "v-disparity of the map", pictures.map_counts, ""),
-                ("after heights", *level, pictures.level_counts, "v-disparity: not there"),
-            ],
-        ],
-    }
