@@ -44,9 +44,7 @@ rotation_options = section(
 )
 
 
-@command(
-    fields=DerotateOptions,
-)
+@command(fields=DerotateOptions)
 @input_options
 @rotation_options
 @output_folder_option
@@ -77,9 +75,7 @@ def derotate(ctx: click.Context, /, **options: Any) -> None:
     _run(ctx, DerotateOptions(**options, result=result, roll_deg=roll_deg))
 
 
-@command(
-    fields=DisparityOptions,
-)
+@command(fields=DisparityOptions)
 @pair_input_options
 @pair_options
 @topic_options
@@ -119,9 +115,7 @@ count_options = section(
 )
 
 
-@command(
-    fields=VDisparityOptions,
-)
+@command(fields=VDisparityOptions)
 @input_options
 @count_options
 @output_folder_option
@@ -153,9 +147,7 @@ def vdisparity(ctx: click.Context, /, **options: Any) -> None:
     _run(ctx, VDisparityOptions(result=options.pop("from"), **options))
 
 
-@command(
-    fields=HeightsOptions,
-)
+@command(fields=HeightsOptions)
 @input_options
 @option("--from", RESULT, required=True, section="Road")
 @option("--skip-suspect", FLAG, section="Road")

@@ -70,10 +70,7 @@ _folders = (
     option("--every", Number("N", at_least=1, whole=True)),
 )
 
-_named = (
-    click.argument("inputs", nargs=-1, type=PATH),
-    option("--files-from", FILE),
-)
+_named = (click.argument("inputs", nargs=-1, type=PATH), option("--files-from", FILE))
 
 input_options = record(
     "inputs",
@@ -267,11 +264,7 @@ _running = (
 running_options = record("running", "Running", RunningOptions, *_running)
 
 cluster_options = record(
-    "running",
-    "Running",
-    RunningOptions,
-    *_running,
-    option("--scheduler", Text("ADDRESS")),
+    "running", "Running", RunningOptions, *_running, option("--scheduler", Text("ADDRESS"))
 )
 
 
