@@ -65,18 +65,18 @@ def take_pictures(subject: Subject) -> Pictures:
     """Take what can be taken: from the images of the subject, else from its map or pair."""
     source, missing = _attempt(lambda: _source(subject))
     disparity = None if source is None else source.shown
-    road, _ = _attempt(lambda: _road(subject, source))
     level, _ = _attempt(lambda: _level(subject, disparity))
-    counts, _ = _attempt(lambda: _level_counts(subject, disparity, level))
-    heights, _ = _attempt(lambda: _heights(subject, source))
+    makers: dict[str, Callable[[], NDArray[Any] | None]] = {
+        "road": lambda: _road(subject, source),
+        "map": lambda: draw_disparity(_required(disparity)),
+        "map_counts": lambda: _counts(_required(disparity), _required(disparity)),
+        "level": lambda: draw_disparity(_required(level)),
+        "level_counts": lambda: _level_counts(subject, disparity, level),
+        "heights": lambda: _heights(subject, source),
+    }
+    made = {name: _attempt(make)[0] for name, make in makers.items()}
     return Pictures(
-        road=None if road is None else _encoded(road),
-        map=None if disparity is None else _encoded(draw_disparity(disparity)),
-        map_counts=None if disparity is None else _encoded(_counts(disparity, disparity)),
-        level=None if level is None else _encoded(draw_disparity(level)),
-        level_counts=None if counts is None else _encoded(counts),
-        heights=None if heights is None else _encoded(heights),
-        missing=missing,
+        **{name: _encoded(each) for name, each in made.items() if each is not None}, missing=missing
     )
 
 

@@ -106,22 +106,12 @@ class Pictured:
         return heights if self.source.stored is not None else steadied(heights)
 
 
-_IMAGES: dict[str, Callable[[Pictured, str], _Named]] = {
-    "derotated": Pictured.derotated,
-    "vdisparity": Pictured.vdisparity,
-    "disparity": Pictured.disparity,
-    "road_mask": Pictured.road_mask,
-    "heights": Pictured.heights,
-    "heights_preview": Pictured.heights_preview,
-}
-
-
 def encode_images(frame: Frame, pictured: Pictured) -> tuple[dict[str, bytes], str]:
     """Make the images that were requested, by their paths, and what the row should say of them."""
     images, note = {}, ""
     for kind, paths in possible_paths(frame, pictured.options.images):
         planned = pictured.options.at(paths[0])
-        target, data = _IMAGES[kind.name](pictured, planned)
+        target, data = getattr(pictured, kind.name)(planned)
         images[target] = data
         if target != planned:
             note = TOO_LARGE_FOR_PNG
