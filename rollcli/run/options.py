@@ -1,4 +1,7 @@
-"""The options of `estimate` and of the conversions. Import-light: the command line loads it for its help."""
+"""The options of `estimate` and of the conversions. Import-light: the command line loads it for its help.
+
+What a docstring says of a field is the help of the field's option, and names values as the option takes them.
+"""
 
 import math
 import posixpath
@@ -70,6 +73,8 @@ class InputOptions(NamedTuple):
 
     Attributes
     ----------
+    inputs : tuple of str
+        Files, folders and patterns; "-" for paths on stdin.
     files_from : str or None
         Read further inputs from FILE, one a line (-: stdin).
     recursive : bool
@@ -182,6 +187,8 @@ class MethodOptions(NamedTuple):
 
     Attributes
     ----------
+    method : str
+        One of `METHODS`.
     model : str
         Disparity of the road as a function of the row.
     road : str
