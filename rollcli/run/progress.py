@@ -20,7 +20,7 @@ from rollcli.rig.calibration import Calibration
 from rollcli.rig.quantities import COLUMNS
 from rollcli.run.frame import FrameResult
 from rollcli.run.options import EncodingOptions, RunningOptions
-from rollcli.stereo.misalignment_words import advice_of
+from rollcli.stereo.misalignment import advice_of
 
 _MOST_FRAMES = 1_000_000  # that the rig's roll is told of: their names and numbers take 150 MB
 

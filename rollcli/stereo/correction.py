@@ -15,8 +15,6 @@ _OFFSET_CI95 = "right_lower_ci95_px"
 _COLUMNS = ("scale", "twist", "pitch", "slope_error")  # as of a `ColumnSupport`
 _REACH = 1.96  # standard errors: of an interval of 95 %
 _LARGEST = (100.0, 45.0, 50.0, 100.0)  # of each; what is more is damage
-CONTRADICTS = "the views do not lie as the correction says"
-"""The doubt of a pair that was levelled as a file says, and is not level then."""
 
 
 def columns_as_text(columns: ColumnSupport) -> dict[str, float]:

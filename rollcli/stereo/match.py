@@ -23,11 +23,8 @@ from rollcli.stereo.alignment import (
     textured_share,
 )
 from rollcli.stereo.along_road import FindRoad, Levelled, Plane, Search, match_for_road
-from rollcli.stereo.columns import with_believed_columns
-from rollcli.stereo.correction import CONTRADICTS
 from rollcli.stereo.first_look import FirstLook, first_look, look_for_range
-from rollcli.stereo.misalignment import LEVEL, NOTHING_KNOWN, Misalignment
-from rollcli.stereo.misalignment_words import NOT_LEVELLED, NOT_TOLD_BY_ROWS, TOO_LITTLE
+from rollcli.stereo.misalignment import LEVEL, NOTHING_KNOWN, ColumnSupport, Misalignment
 from rollcli.stereo.options import StereoOptions as StereoOptions
 from rollcli.stereo.refinement import refined
 from rollcli.stereo.sgbm import NARROWEST, usable_range
@@ -94,6 +91,12 @@ _KEPT_SPREAD = 0.15  # px
 # (95 %) where the baseline is a third of the camera's height
 _OPEN_COLUMNS = 0.001
 _FURTHEST = Misalignment(12.0, 0.03, 0.02, 0.0)  # what no rig in use has: px, radians, share
+# the doubts of a pair: its correction was still changing when it was given up, or could not be checked; its
+# columns may be far from where they are believed to be; it is not level once it was levelled as a file says
+NOT_LEVELLED = "the views are not level, and could not be levelled"
+TOO_LITTLE = "too little can be compared to tell whether the views are level"
+NOT_TOLD_BY_ROWS = "the rows do not tell whether the right view is larger or its rows are bent: recalibrate"
+CONTRADICTS = "the views do not lie as the correction says"
 
 
 class Wanted(NamedTuple):
@@ -307,7 +310,7 @@ def match_pair(
         doubt = NOT_TOLD_BY_ROWS
 
     def finished(found: Map) -> Map:
-        return with_believed_columns(refined(found, views, corrected), corrected, support)
+        return _with_believed_columns(refined(found, views, corrected), corrected, support)
 
     valid = cv2.countNonZero(matched)
     whole = None
@@ -366,3 +369,35 @@ def _doubt(corrected: Misalignment, errors: Misalignment) -> str:
     )
     far |= abs(corrected.scale) > _UNUSUAL_SCALE and errors.offset > _UNUSUAL_ERROR
     return "the views lie too far from level to be sure of the correction" if far else ""
+
+
+def _with_believed_columns(disparity: Map, matched: Misalignment, support: ColumnSupport) -> Map:
+    """Return the map of a pair whose columns lie as is believed.
+
+    Views are warped by all that their rows show, for the match needs rows that agree. A scale of the rows is
+    in the columns only as far as it is supported, and the rest of it is taken out of the disparities again. A
+    yaw moves the columns by t x^2 where it moves the rows by t x y, and a pitch by q x y where it moves the
+    rows by q y^2.
+
+    Parameters
+    ----------
+    disparity : ndarray of float32, shape (H, W)
+        Of views of which the right one was levelled by `matched`, px; no data is 0.
+    matched : Misalignment
+        Pixels of this size.
+    support : ColumnSupport
+        What is in the columns.
+    """
+    if support == NOTHING_KNOWN and not matched.scale:
+        return disparity
+    height, width = disparity.shape
+    u = np.arange(width, dtype=np.float32) - np.float32((width - 1) / 2)
+    v = np.arange(height, dtype=np.float32)[:, None] - np.float32((height - 1) / 2)
+    x = u - disparity
+    moved = x * np.float32(support.twist)
+    moved += np.float32(support.pitch) * v + np.float32(support.scale - matched.scale)
+    moved *= x
+    moved += disparity
+    np.maximum(moved, np.float32(1e-3), out=moved)
+    moved *= disparity > 0
+    return moved

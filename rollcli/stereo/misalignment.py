@@ -1,4 +1,7 @@
-"""How the right view of a pair lies against the left one; and what of it is in its columns; import-light."""
+"""How the right view of a pair lies against the left one, what of it is in its columns, and what to do.
+
+Import-light.
+"""
 
 import math
 from collections.abc import Sequence
@@ -149,3 +152,29 @@ class ColumnSupport:
 
 
 NOTHING_KNOWN = ColumnSupport(0.0, 0.0, 0.0, 0.0)
+
+
+def advice_of(lower: float, clockwise: float, larger: float, twist: float) -> str:
+    """Return what a run says of its rig, in a sentence; empty where nothing is far enough from level.
+
+    Parameters
+    ----------
+    lower, clockwise, larger, twist : float
+        How the right view lies, px, degrees, per cent, and px in the corners.
+
+    Notes
+    -----
+    An image that is turned clockwise is of a camera that is rolled counter-clockwise, seen from behind.
+    """
+    parts = []
+    if abs(clockwise) >= 0.03:
+        way = "counter-clockwise" if clockwise > 0 else "clockwise"
+        against = f"against the left, {way} seen from behind"
+        parts.append(f"the right camera is rolled by {abs(clockwise):.2f} degrees {against}")
+    if abs(lower) >= 0.15:
+        parts.append(f"the right image lies {abs(lower):.2f} px {'lower' if lower > 0 else 'higher'}")
+    if abs(larger) >= 0.1:
+        parts.append(f"the right image is {abs(larger):.2f} % {'larger' if larger > 0 else 'smaller'}")
+    if abs(twist) >= 0.5:
+        parts.append(f"its rows are skewed by {abs(twist):.1f} px in the corners")
+    return ", ".join(parts) + ": recalibrate" if parts else ""

@@ -6,7 +6,6 @@ from rollcli.stereo import match as stereo
 from rollcli.stereo.alignment import Measured
 from rollcli.stereo.first_look import FirstLook
 from rollcli.stereo.misalignment import Misalignment
-from rollcli.stereo.misalignment_words import NOT_LEVELLED
 
 SHAPE = (200, 300)
 
@@ -55,7 +54,7 @@ class Rig:
 def test_a_pair_that_runs_away_is_given_up_after_four_matches(monkeypatch):
     rig = Rig(lambda at: at + 1.0)
     corrected, doubt = rig.run(monkeypatch, lies(0.0))
-    assert doubt == NOT_LEVELLED
+    assert doubt == stereo.NOT_LEVELLED
     assert len(rig.matched) == 4
     assert corrected == rig.matched[-1]  # what was matched, not what would be tried next
 

@@ -7,8 +7,7 @@ import pytest
 
 from rollcli.files.results import Row
 from rollcli.run.progress import RunSummary
-from rollcli.stereo.misalignment import Misalignment
-from rollcli.stereo.misalignment_words import advice_of
+from rollcli.stereo.misalignment import Misalignment, advice_of
 
 
 def test_views_twice_as_large_shift_twice_as_far_everywhere():
