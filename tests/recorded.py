@@ -41,6 +41,16 @@ def check(package, case, answer, *, rel=1e-6, least=1e-6):
     assert found == expected
 
 
+def recorded_test(package, cases, *, rel=1e-6, least=1e-6):
+    """The test that each case of a package has the recorded answer."""
+
+    @pytest.mark.parametrize("case", cases)
+    def test_answers_are_those_recorded(case):
+        check(package, case, cases[case](), rel=rel, least=least)
+
+    return test_answers_are_those_recorded
+
+
 def made(make, *arguments, **options):
     """What is made, or the sentence that says why not."""
     try:

@@ -6,12 +6,11 @@ from functools import partial
 from pathlib import Path
 
 import click
-import pytest
 
 from rollcli.cli import types
 from tests import sessions
 from tests.readme_tables import commands
-from tests.recorded import check
+from tests.recorded import recorded_test
 
 
 @sessions.parametrize("cli")
@@ -76,7 +75,4 @@ CASES = {
     },
 }
 
-
-@pytest.mark.parametrize("case", CASES)
-def test_answers_are_those_recorded(case):
-    check("cli", case, CASES[case]())
+test_answers_are_those_recorded = recorded_test("cli", CASES)

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.odd_views import seen_by
 from tests.run_cli import rollcli, rows_of
 
 TRUTH = {"right_lower_px": 1.2, "right_clockwise_deg": 0.15, "right_larger_percent": 0.3}
@@ -17,12 +18,7 @@ NEAR = {"right_lower_px": 0.1, "right_clockwise_deg": 0.02, "right_larger_percen
 def put_off(path, target):
     """Turn a view by 0.15 degrees about its centre, enlarge it by 0.3 % and lower it by 1.2 px."""
     view = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    height, width = view.shape[:2]
-    turn = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), -0.15, 1.003)
-    turn[1, 2] += 1.2
-    # OpenCV's cubic would move what it shows by up to 0.05 px, as if the view were turned
-    how = {"flags": cv2.INTER_LANCZOS4, "borderMode": cv2.BORDER_REPLICATE}
-    moved = cv2.warpAffine(view, turn, (width, height), **how)
+    moved = seen_by(view, clockwise_deg=0.15, larger_percent=0.3, lower=1.2, border=cv2.BORDER_REPLICATE)
     cv2.imwrite(str(target / path.name), moved)
 
 

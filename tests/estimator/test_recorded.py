@@ -4,7 +4,6 @@ import math
 from functools import partial
 
 import numpy as np
-import pytest
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
@@ -16,7 +15,7 @@ from rollcli.estimator.solvers.exact import minima
 from rollcli.estimator.solvers.golden_section import golden_section
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from tests.estimator.synthetic_maps import bent_road, energy_of, flat_road
-from tests.recorded import check, made
+from tests.recorded import made, recorded_test
 
 WIDTH, HEIGHT = 240, 160
 _road = partial(flat_road, width=WIDTH, height=HEIGHT)
@@ -214,8 +213,5 @@ CASES = {
     **{f"solved {name}": partial(_solved, name) for name in ("curved", "nothing but noise")},
 }
 
-
-@pytest.mark.parametrize("case", CASES)
-def test_answers_are_those_recorded(case):
-    # sums of single precision depend on the processor's BLAS, and with them which pixels are road
-    check("estimator", case, CASES[case](), rel=2e-4, least=2e-4)
+# sums of single precision depend on the processor's BLAS, and with them which pixels are road
+test_answers_are_those_recorded = recorded_test("estimator", CASES, rel=2e-4, least=2e-4)

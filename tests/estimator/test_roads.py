@@ -5,14 +5,12 @@ import math
 
 import pytest
 
-from rollcli.estimator.energy import Energy
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.moments import map_moments
 from rollcli.estimator.request import Request, SolverSettings
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.files.formats import read_image
 from rollcli.stereo.match import StereoOptions, match_pair
-from tests.estimator.synthetic_maps import ROADS
+from tests.estimator.synthetic_maps import ROADS, energy_of
 
 ROLL_DEG = {"m1_L1": -3.47, "m1_L5": -1.62, "m2_L9": -2.54, "m2_L18": -4.30, "m3_L3": 2.36}
 HALF_SIZE = StereoOptions(num_disparities=256, block_size=5, mode="3way", downscale=2)
@@ -26,12 +24,6 @@ pytestmark = pytest.mark.skipif(not ROADS.is_dir(), reason=f"the real road pairs
 def disparity_of(stem):
     left, right = ROADS / "left" / f"{stem}.png", ROADS / "right" / f"{stem.replace('L', 'R')}.png"
     return match_pair(read_image(left), read_image(right), HALF_SIZE).disparity
-
-
-@functools.cache
-def energy_of(stem):
-    disparity = disparity_of(stem)
-    return Energy.of(map_moments(disparity), float(disparity.max()))
 
 
 @pytest.fixture(params=ROLL_DEG)
@@ -48,7 +40,8 @@ def test_gradient_descent_converges_within_6_iterations_to_the_known_angle(stem)
 
 
 def test_gradient_descents_iterations_are_within_one_of_the_papers(stem):
-    counts = [gradient_descent(energy_of(stem), SolverSettings(delta)).iterations for delta in DELTAS]
+    energy = energy_of(disparity_of(stem))
+    counts = [gradient_descent(energy, SolverSettings(delta)).iterations for delta in DELTAS]
     assert all(abs(count - paper) <= 1 for count, paper in zip(counts, PAPER, strict=True)), counts
 
 

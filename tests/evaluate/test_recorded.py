@@ -32,7 +32,7 @@ from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.files.results import Row
 from rollcli.run.options import EncodingOptions, InputOptions, RegionOptions, RunningOptions
 from tests.estimator.synthetic_maps import bent_road
-from tests.recorded import check, made
+from tests.recorded import made, recorded_test
 from tests.report.test_recorded import drawn
 
 ANGLES = ((-1.0, 1.0, 0.3), (0.0, 5.0, 2.0), (0.0, 0.3, 0.1), (1.0, 2.95, 1.0), (-8.0, -8.0, 3.0))
@@ -220,7 +220,4 @@ CASES = {
     "as json": partial(_compared, as_json),
 }
 
-
-@pytest.mark.parametrize("case", CASES)
-def test_answers_are_those_recorded(case):
-    check("evaluate", case, CASES[case](), rel=2e-4, least=2e-4)
+test_answers_are_those_recorded = recorded_test("evaluate", CASES, rel=2e-4, least=2e-4)

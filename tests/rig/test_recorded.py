@@ -5,7 +5,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.request import Request
@@ -19,7 +18,7 @@ from rollcli.rig.quantities import ALIGNMENT, HEIGHT, PITCH, ROLL
 from rollcli.rig.read_calibration import parse_calibration
 from rollcli.rig.words import answer, counts, drift_in_words, findings, now_in_words, one_line
 from tests.estimator.synthetic_maps import bent_road
-from tests.recorded import check, made
+from tests.recorded import made, recorded_test
 from tests.rig import calibration_files as files
 from tests.rig.drive.series import drive
 
@@ -325,7 +324,4 @@ CASES = {
     ],
 }
 
-
-@pytest.mark.parametrize("case", CASES)
-def test_answers_are_those_recorded(case):
-    check("rig", case, CASES[case](), rel=1e-5, least=1e-6)
+test_answers_are_those_recorded = recorded_test("rig", CASES, rel=1e-5, least=1e-6)

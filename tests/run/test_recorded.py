@@ -13,7 +13,7 @@ from rollcli.run.options import GateOptions
 from rollcli.run.rig_gates import Check, check_options, run_checks, status_of
 from rollcli.run.rig_text import Findings, as_csv, as_json, as_table
 from tests import sessions
-from tests.recorded import check
+from tests.recorded import recorded_test
 from tests.run.rigs import UNKNOWN, known, rig, sequence, short
 
 
@@ -200,7 +200,4 @@ CASES = {
     **{f"as {name}": partial(_told, write) for name, write in TOLD.items()},
 }
 
-
-@pytest.mark.parametrize("case", CASES)
-def test_answers_are_those_recorded(case):
-    check("run", case, CASES[case]())
+test_answers_are_those_recorded = recorded_test("run", CASES)

@@ -4,14 +4,12 @@ import math
 from dataclasses import replace
 from functools import partial
 
-import pytest
-
 from rollcli.simulate.build import build_scene, carriageway_of, draw_dips, render_frame, road_camber
 from rollcli.simulate.dataset import calibration, lane_rolls_of, truth_csv
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
 from rollcli.simulate.views import render_view
-from tests.recorded import check, made
+from tests.recorded import made, recorded_test
 
 SMALL = {"size": (96, 72), "focal": 60.0}
 _frame = partial(FrameSpec, **SMALL)
@@ -111,7 +109,4 @@ CASES = {
     ],
 }
 
-
-@pytest.mark.parametrize("case", CASES)
-def test_answers_are_those_recorded(case):
-    check("simulate", case, CASES[case](), rel=2e-5, least=2e-5)
+test_answers_are_those_recorded = recorded_test("simulate", CASES, rel=2e-5, least=2e-5)

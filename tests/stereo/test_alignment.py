@@ -20,6 +20,7 @@ from rollcli.stereo.alignment import Approach, level
 from rollcli.stereo.match import StereoOptions, match_pair
 from rollcli.stereo.misalignment import LEVEL, Misalignment
 from rollcli.stereo.views import resampled
+from tests.odd_views import seen_by
 from tests.slow import mostly_slow
 
 SHARED = Path(__file__).parents[2].parent / "shared"
@@ -39,17 +40,6 @@ ODD_RIGS = [  # degrees clockwise, percent larger, pixels lower
 @pytest.fixture(scope="module", params=mostly_slow(["open", "street"], "street"))
 def frame(request):
     return render_frame(FrameSpec(scene=request.param, roll=ROLL, seed=31, colour=False))
-
-
-def seen_by(view, *, clockwise_deg=0.0, larger_percent=0.0, lower=0.0):
-    """The view as an odd camera sees it; OpenCV's own matrix, not the program's formulas."""
-    height, width = view.shape[:2]
-    centre = (width - 1) / 2, (height - 1) / 2
-    matrix = cv2.getRotationMatrix2D(centre, -clockwise_deg, 1 + larger_percent / 100)
-    matrix[1, 2] += lower
-    return cv2.warpAffine(
-        view, matrix, (width, height), flags=cv2.INTER_LANCZOS4, borderMode=cv2.BORDER_REFLECT
-    )
 
 
 def roll_deg(left, right, **options):

@@ -9,20 +9,16 @@ import pytest
 
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.request import Request
-from rollcli.estimator.road.find import road_plane
 from rollcli.files.formats import read_image
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
 from rollcli.stereo.match import StereoOptions, Wanted, compute_disparity, match_pair
+from tests.odd_views import find_road, seen_by
 from tests.true_disparity import true_disparity
 
 LIDAR = Path(__file__).parents[2].parent / "shared" / "lidar"
 SPEC = FrameSpec(scene="street", roll=math.radians(4), size=(640, 480), seed=3)
-
-
-def find_road(small):
-    return road_plane(small, None, math.radians(45), 0)
 
 
 ROAD = Wanted(road=find_road)
@@ -106,11 +102,7 @@ def test_a_map_of_everything_gives_the_angle_of_the_pair():
 
 @pytest.mark.parametrize(("lower", "clockwise_deg"), [(3.0, 0.0), (0.0, 0.4), (-1.5, -0.3)])
 def test_a_right_view_that_is_out_of_place_is_levelled_on_the_way(street, road, lower, clockwise_deg):
-    height, width = street.right.shape[:2]
-    matrix = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), -clockwise_deg, 1)
-    matrix[1, 2] += lower
-    how = {"flags": cv2.INTER_LANCZOS4, "borderMode": cv2.BORDER_REFLECT}
-    moved = cv2.warpAffine(street.right, matrix, (width, height), **how)
+    moved = seen_by(street.right, clockwise_deg=clockwise_deg, lower=lower)
 
     found = match_pair(street.left, moved, StereoOptions(), ROAD)
 

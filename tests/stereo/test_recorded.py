@@ -8,17 +8,16 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import pytest
 
 from rollcli.errors import RollcliError
-from rollcli.estimator.road.find import road_plane
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
 from rollcli.stereo.alignment import level, seen_from_right
 from rollcli.stereo.match import StereoOptions, Wanted, match_pair
 from rollcli.stereo.misalignment import Misalignment
 from rollcli.stereo.row_fit import ColumnEvidence, column_support
-from tests.recorded import check
+from tests.odd_views import find_road, seen_by
+from tests.recorded import recorded_test
 
 SIZE = (224, 160)
 
@@ -27,17 +26,6 @@ SIZE = (224, 160)
 def _scene(scene="street", seed=3, size=SIZE, focal=150.0):
     frame = render_frame(FrameSpec(scene, math.radians(4), 0.06, size=size, focal=focal, seed=seed))
     return frame.left, frame.right
-
-
-def _moved(view, clockwise_deg=0.0, larger_percent=0.0, lower=0.0):
-    width, height = view.shape[1::-1]
-    matrix = cv2.getRotationMatrix2D(
-        ((width - 1) / 2, (height - 1) / 2), -clockwise_deg, 1 + larger_percent / 100
-    )
-    matrix[1, 2] += lower
-    return cv2.warpAffine(
-        view, matrix, (width, height), flags=cv2.INTER_LANCZOS4, borderMode=cv2.BORDER_REFLECT
-    )
 
 
 def _texture(disparity=14.0, slope=0.0):
@@ -49,14 +37,10 @@ def _texture(disparity=14.0, slope=0.0):
     return wide[:, columns], np.stack([row[columns + shift] for row, shift in zip(wide, shifts, strict=True)])
 
 
-def _road(small):
-    return road_plane(small, None, math.radians(45), 0)
-
-
 def _match(views, odd=None, wanted=None, **options):
     left, right = views()
     try:
-        found = match_pair(left, _moved(right, **(odd or {})), StereoOptions(**options), wanted or Wanted())
+        found = match_pair(left, seen_by(right, **(odd or {})), StereoOptions(**options), wanted or Wanted())
     except RollcliError as error:
         return str(error)
     disparity, measured = found.disparity[found.disparity > 0], found.measured
@@ -98,7 +82,7 @@ def _corrected(odd, columns=None, **options):
 def _drive():
     """What pairs of one rig say together of its columns, px in the corners."""
     views = _scene(), _scene(seed=4), _scene("open", 10)
-    found = [match_pair(left, _moved(right, **ODD), StereoOptions()).measured for left, right in views]
+    found = [match_pair(left, seen_by(right, **ODD), StereoOptions()).measured for left, right in views]
     told = column_support(ColumnEvidence.of_drive([each.evidence for each in found]))
     parts = Misalignment(scale=told.scale, twist=told.twist, curve=told.pitch)
     return {"columns": parts.shifts(*SIZE[::-1]), "slope_error_px": told.error * SIZE[0]}
@@ -144,12 +128,12 @@ CASES = {
     ),
     "corrected otherwise": partial(_corrected, {"lower": -3.0}),
     "given": partial(_match, _scene, {"lower": 2.0}, vertical_offset=2.0),
-    "along the road": partial(_match, _scene, None, Wanted(road=_road)),
-    "along a road of full size": partial(_match, FULL, None, Wanted(road=_road)),
-    "along a road in a high view": partial(_match, HIGH, ODD, Wanted(road=_road)),
-    "a high view, whole": partial(_match, HIGH, ODD, Wanted(_road, whole=True)),
-    "full size, whole": partial(_match, FULL, ODD, Wanted(_road, whole=True)),
-    "whole": partial(_match, _scene, None, Wanted(_road, whole=True)),
+    "along the road": partial(_match, _scene, None, Wanted(road=find_road)),
+    "along a road of full size": partial(_match, FULL, None, Wanted(road=find_road)),
+    "along a road in a high view": partial(_match, HIGH, ODD, Wanted(road=find_road)),
+    "a high view, whole": partial(_match, HIGH, ODD, Wanted(find_road, whole=True)),
+    "full size, whole": partial(_match, FULL, ODD, Wanted(find_road, whole=True)),
+    "whole": partial(_match, _scene, None, Wanted(find_road, whole=True)),
     "smaller": partial(_match, _scene, None, downscale=1.5),
     "five ways": partial(_match, _scene, None, mode="sgbm", num_disparities=48, block_size=7),
     "eight ways": partial(_match, _scene, None, mode="hh", speckle_size=0, uniqueness=2),
@@ -172,8 +156,5 @@ CASES = {
     ],
 }
 
-
-@pytest.mark.parametrize("case", CASES)
-def test_answers_are_those_recorded(case):
-    # px: as much as OpenCV 4.7 and 5.0 differ by
-    check("stereo", case, CASES[case](), rel=1e-4, least=1e-3)
+# px: as much as OpenCV 4.7 and 5.0 differ by
+test_answers_are_those_recorded = recorded_test("stereo", CASES, rel=1e-4, least=1e-3)

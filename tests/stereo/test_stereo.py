@@ -10,13 +10,13 @@ import pytest
 from rollcli.errors import InputError, UsageError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.request import Request
-from rollcli.estimator.road.find import road_plane
 from rollcli.files.formats import read_image
 from rollcli.files.inputs import pair_inputs
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
 from rollcli.stereo import sgbm
 from rollcli.stereo.match import StereoOptions, Wanted, compute_disparity, match_pair
+from tests.odd_views import find_road
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 ROADS = {"m1_L1": -3.47, "m1_L5": -1.62, "m2_L9": -2.54, "m2_L18": -4.30, "m3_L3": 2.36}
@@ -30,10 +30,6 @@ def pair_at(disparity, shape=(120, 400), seed=0):
     shifts = np.broadcast_to(np.rint(disparity).astype(int), shape[0])
     right = np.stack([row[columns + shift] for row, shift in zip(texture, shifts, strict=True)])
     return texture[:, columns], right
-
-
-def find_road(small):
-    return road_plane(small, None, math.radians(45), 0)
 
 
 @pytest.fixture(scope="module")

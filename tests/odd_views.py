@@ -1,0 +1,24 @@
+"""What a right camera sees that is turned, lower or larger, and the road's plane as `estimate` finds it."""
+
+import math
+
+import cv2
+
+from rollcli.estimator.road.find import road_plane
+
+
+def seen_by(view, *, clockwise_deg=0.0, larger_percent=0.0, lower=0.0, border=cv2.BORDER_REFLECT):
+    """The view as an odd camera sees it; OpenCV's own matrix, not the program's formulas.
+
+    OpenCV's cubic would move what it shows by up to 0.05 px, as if the view were turned.
+    """
+    height, width = view.shape[:2]
+    centre = (width - 1) / 2, (height - 1) / 2
+    matrix = cv2.getRotationMatrix2D(centre, -clockwise_deg, 1 + larger_percent / 100)
+    matrix[1, 2] += lower
+    return cv2.warpAffine(view, matrix, (width, height), flags=cv2.INTER_LANCZOS4, borderMode=border)
+
+
+def find_road(small):
+    """The plane of the road in a small map."""
+    return road_plane(small, None, math.radians(45), 0)
