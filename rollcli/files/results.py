@@ -55,14 +55,27 @@ def encode_parquet(
 
     columns = [(name, _ARROW_TYPES[kind]) for name, kind in types.items()]
     schema = pyarrow.schema(columns, metadata={_RECORD: json.dumps(record).encode()})
-    try:
-        table = pyarrow.Table.from_pylist(list(rows), schema=schema)
-    except UnicodeEncodeError as error:
-        name = error.object.encode("utf-8", "backslashreplace").decode()
-        raise UsageError(f"{name}: this name is not UTF-8, which Parquet cannot hold; use CSV") from error
+    require_utf8(text for row in rows for text in row.values() if isinstance(text, str))
+    table = pyarrow.Table.from_pylist(list(rows), schema=schema)
     target = io.BytesIO()
     pyarrow.parquet.write_table(table, target, compression="zstd", version="2.6", write_page_checksum=True)
     return target.getvalue()
+
+
+def require_utf8(texts: Iterable[str]) -> None:
+    """Refuse what Parquet cannot hold.
+
+    Raises
+    ------
+    UsageError
+        A text is not UTF-8, as a file name need not be.
+    """
+    for text in texts:
+        try:
+            text.encode()
+        except UnicodeEncodeError:
+            name = text.encode("utf-8", "backslashreplace").decode()
+            raise UsageError(f"{name}: this name is not UTF-8, which Parquet cannot hold; use CSV") from None
 
 
 def decode_parquet(data: bytes, name: str) -> Iterator[tuple[int, dict[str, Any]]]:

@@ -7,7 +7,7 @@ from itertools import chain
 
 from rollcli.errors import UsageError
 from rollcli.files.containers import file_of
-from rollcli.files.results import IMAGE_ROLL, TIMING, Format, run_path
+from rollcli.files.results import IMAGE_ROLL, TIMING, Format, require_utf8, run_path
 from rollcli.files.stores.locations import is_url, tasks_in_hand
 from rollcli.files.stream import is_stream
 from rollcli.run.find import Named, calibration_files, check_depth, check_first_size, map_frames, pair_frames
@@ -92,6 +92,8 @@ def make_plan(options: EstimateOptions) -> Plan:
         check_nothing_is_there(images_of(frames, options.images))
     if plan.format == "parquet" and is_stream(plan.output):
         raise UsageError("Parquet is a folder of parts: name it with --output")
+    if plan.format == "parquet" and not options.inputs.sorted:  # those are read as they are needed
+        require_utf8(name for frame in frames for name in (frame.file, frame.right_file))
     return replace(plan, frames=frames, further=further, notes=tuple(notes))
 
 

@@ -1,12 +1,14 @@
 """Results as Parquet: damage is refused, and so is what was made to fill the memory."""
 
 import io
+import sys
 
 import pytest
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.results import Row, column_types, decode_parquet, encode_parquet, plain_values
 from tests.fuzz.mutations import every_region
+from tests.run_cli import rollcli
 
 pyarrow = pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -84,3 +86,12 @@ def test_a_name_that_is_not_utf8_is_refused_with_what_to_do():
         UsageError, match=r"^caf\\udce9.png: this name is not UTF-8, which Parquet cannot hold; use CSV"
     ):
         encode_parquet(column_types(), rows, {})
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names are UTF-8 elsewhere")
+def test_such_a_name_is_refused_before_anything_is_done(tmp_path):
+    (tmp_path / "maps").mkdir()
+    (tmp_path / "maps" / "caf\udce9.png").write_bytes(b"")
+    done = rollcli("estimate", "maps", "-o", "r.parquet", "--derotated", "up", cwd=tmp_path)
+    assert "is not UTF-8" in done.refused()
+    assert [each.name for each in tmp_path.iterdir()] == ["maps"]
