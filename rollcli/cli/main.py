@@ -18,7 +18,7 @@ from rollcli.messages import one_line, say
 COMMANDS = {
     "estimate": (
         "rollcli.cli.estimate",
-        "The roll of each disparity map or stereo pair, as CSV or JSON Lines.",
+        "The roll of each disparity map or stereo pair, as CSV, JSON Lines or Parquet.",
     ),
     "disparity": ("rollcli.cli.images", "Stereo pairs to disparity maps with OpenCV SGBM."),
     "derotate": ("rollcli.cli.images", "Rotate maps by one angle, or by the angles of a result."),

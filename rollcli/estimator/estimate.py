@@ -40,7 +40,7 @@ class RollEstimate:
     alpha : tuple of float
         The road's (a0, a1, a2), px, y measured from the centre of the top-left pixel.
     valid_fraction, road_fraction : float
-        The share of all pixels that is valid, and the share of the valid ones that was used as road.
+        The share of all pixels that is valid, and the share of the valid ones that the road's fit used.
     width, height : int
         Of the map, px.
     camber : float or None
@@ -55,7 +55,7 @@ class RollEstimate:
     height_m, height_ci95_m : float or None
         Height of the left camera over the road near ahead, metres; None without a baseline.
     road_mask : ndarray of bool, shape (H, W), or None
-        The pixels that were used as road, where this was asked for.
+        The pixels that lie on the road that was found, where this was asked for.
     """
 
     theta: float

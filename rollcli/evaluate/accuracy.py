@@ -28,7 +28,7 @@ from rollcli.run.resume import recorded_options
 LARGE_ERROR_DEG = 0.5
 DISTANCES_M = (5, 10, 20)
 _WITHIN = 0.2  # of a distance
-_MOST = 50_000  # pixels of a frame at a distance: more would not change the figures
+_MOST = 50_000  # pixels of a frame at a distance: more would not change median, percentile and mean
 
 
 @dataclass(frozen=True)
@@ -202,6 +202,7 @@ def assess_heights(
     """
     folders = [_maps_of(folder) for folder in (heights, f"{truth}/heights", f"{truth}/disparity")]
     errors: dict[int, list[NDArray[np.float64]]] = {distance: [] for distance in DISTANCES_M}
+    worst = dict.fromkeys(DISTANCES_M, 0.0)
     compared = False
     for row in rows:
         stem = stem_of(row.file)
@@ -212,10 +213,15 @@ def assess_heights(
             compared = True
             estimated, true, disparity = (folder[stem] for folder in folders)
             for distance, found in _height_errors(estimated, true, disparity, rig.focal_baseline):
-                errors[distance].append(found)
+                errors[distance].append(found[:: -(-len(found) // _MOST)])
+                worst[distance] = max(worst[distance], float(np.abs(found).max()))
     if not compared:
         return None
-    return {at: _figures(np.concatenate(parts), len(parts)) for at, parts in errors.items() if parts}
+    return {
+        at: replace(_figures(np.concatenate(parts), len(parts)), worst=worst[at])
+        for at, parts in errors.items()
+        if parts
+    }
 
 
 def _height_errors(
@@ -234,7 +240,7 @@ def _height_errors(
     for distance in DISTANCES_M:
         found = off[np.isfinite(off) & (np.abs(ahead / distance - 1) < _WITHIN)]
         if len(found):
-            yield distance, found[:: -(-len(found) // _MOST)]
+            yield distance, found
 
 
 def _maps_of(folder: str) -> dict[str, str]:
@@ -369,7 +375,14 @@ def _heights(
         heights = recorded_options(read.run, run_path(options.result)).images.heights
         if heights is None or not (is_folder(heights) and is_folder(f"{beside}/heights")):
             return {}
-    found = assess_heights(read.rows, known, heights, beside)
+    try:
+        found = assess_heights(read.rows, known, heights, beside)
+    except InputError as error:
+        if options.heights is not None:
+            raise
+        if not options.running.quiet:  # nobody has asked for them
+            say(f"no heights are compared: {error}")
+        return {}
     if found is None and not options.running.quiet:
         say(
             f"{heights}: no heights are compared: they need metres (estimate --calib), and the truth columns "

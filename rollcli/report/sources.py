@@ -186,7 +186,9 @@ class _ImageFolder:
 
 
 def _images(row: Row, images: _ImageFolder, recorded: ImageOptions) -> dict[str, str]:
-    return {kind.name: path for kind in KINDS if (path := _image(kind, row, images, recorded))}
+    # a run that has written images has written no other kinds: what has their names is another's
+    kinds = [kind for kind, _ in recorded.folders()] or KINDS
+    return {kind.name: path for kind in kinds if (path := _image(kind, row, images, recorded))}
 
 
 def _image(kind: ImageKind, row: Row, images: _ImageFolder, recorded: ImageOptions) -> str | None:
@@ -200,8 +202,9 @@ def _image(kind: ImageKind, row: Row, images: _ImageFolder, recorded: ImageOptio
 
 def _folders(kind: str, images: _ImageFolder, recorded: str | None) -> Iterator[str]:
     """Yield where images of a kind may be: in the folder named, under the name it had or the option's."""
-    names = {base_name(recorded.rstrip("/")), kind} - {".."} if recorded is not None else {kind}
-    for name in sorted(names):
+    given = [] if recorded is None else [base_name(recorded.rstrip("/"))]
+    names = [name for name in dict.fromkeys([*given, kind]) if name != ".."]
+    for name in names:
         yield f"{name}/"
     if images.is_one_of(names, recorded):
         yield ""

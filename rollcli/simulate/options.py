@@ -43,7 +43,7 @@ class Rendering:
     noise : float
         Noise of the sensor: standard deviation in grey levels of 255.
     gain : float
-        Brightness of the right view relative to the left one.
+        Light of the right view relative to the left one; grey levels change with its square root.
     seed : int
         Seed of the random numbers; the same seed gives the same files.
     """

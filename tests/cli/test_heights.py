@@ -63,6 +63,19 @@ def test_accuracy_compares_heights_where_truth_has_them(rendered):
     assert "heights" not in rollcli(*arguments[:-2], "--truth", "none/truth.csv", cwd=_apart(rendered)).out
 
 
+def test_heights_of_another_size_do_not_keep_accuracy_from_comparing_angles(tmp_path, rendered):
+    """Views that were matched at half the size have heights of that size, unasked for."""
+    pairs = ("--left", str(rendered / "left"), "--right", str(rendered / "right"), "--downscale", "2")
+    more = ("--calib", str(rendered / "calib.txt"), "--heights", "half")
+    assert rollcli("estimate", *pairs, *more, "-o", "rolls.csv", cwd=tmp_path).status == 0
+    arguments = ("evaluate", "accuracy", "rolls.csv", "--truth", str(rendered / "truth.csv"))
+    done = rollcli(*arguments, cwd=tmp_path)
+    assert (done.status, done.out.startswith("frames compared")) == (0, True)
+    assert "no heights are compared: half/frame_0001.tif" in done.err
+    assert "differ in size" in done.err
+    assert rollcli(*arguments, "--heights", "half", cwd=tmp_path).status == 2
+
+
 def _png(path):
     import cv2
 

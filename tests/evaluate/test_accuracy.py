@@ -57,3 +57,22 @@ def test_an_error_of_just_the_limit_is_not_above_it_and_just_of_the_interval_is_
     assert assess([given], {"frame1": KnownPose(0.0, 0.0)}).pitch.coverage_95 == 1
     unsure = dataclasses.replace(given, pitch_ci95_deg=None)
     assert assess([unsure], {"frame1": KnownPose(0.0, 0.0)}).pitch.coverage_95 is None
+
+
+def test_the_worst_height_is_the_worst_of_all_pixels(tmp_path):
+    """Of many pixels some are enough for the other figures; the worst may be among those left out."""
+    off = np.zeros((300, 400), np.float32)
+    off[::2, 1] = 0.5  # 120,000 pixels at 5 m: every third would be taken
+    off[7, 9] = -2.0
+    for name, values in (
+        ("made", off),
+        ("truth/heights", 0 * off),
+        ("truth/disparity", np.full_like(off, 20)),
+    ):
+        (tmp_path / name).mkdir(parents=True)
+        np.save(tmp_path / name / "frame1.npy", values)
+    known = {"frame1": KnownPose(0.0, focal_baseline=100.0)}
+    row = dataclasses.replace(rows(1, ending=".npy")[0], height_m=1.5)
+    found = assess_heights([row], known, str(tmp_path / "made"), str(tmp_path / "truth"))
+    assert (7 * 400 + 9) % 3
+    assert found[5].worst == 2

@@ -19,7 +19,7 @@ import pytest
 from rollcli.files.results import read_result
 from rollcli.report import pictures
 from tests.report.results import row, write_result
-from tests.run_cli import rollcli, write_kitti, write_maps
+from tests.run_cli import road_map, rollcli, write_kitti, write_maps
 
 pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
 pytest.importorskip("jinja2", reason="jinja2, of the extra report, is not here")
@@ -256,3 +256,16 @@ def test_results_of_several_runs_are_drives_and_shards_are_one(tmp_path):
     first = [each[3] for each in json.loads(rows)["rows"][:4]]
     assert [number > 0 for number in first] == [True, False, True, False]
     assert "named twice" in rollcli("report", "a.csv", "a.csv", *again, cwd=tmp_path).refused()
+
+
+def test_the_captions_say_what_the_map_is_turned_by_where_fx_and_fy_differ(tmp_path):
+    write_kitti(tmp_path / "maps" / "frame0.png", road_map(0.2))
+    rig = ["P0: 100 0 80 0 0 200 60 0 0 0 1 0", "P1: 100 0 80 -50 0 200 60 0 0 0 1 0"]
+    (tmp_path / "calib.txt").write_text("\n".join(rig))
+    made = rollcli("estimate", "maps", "--calib", "calib.txt", "-o", "rolls.csv", cwd=tmp_path)
+    assert made.status == 0, made.err
+    assert report(tmp_path, "rolls.csv").status == 0
+    (only,) = read_result(tmp_path / "rolls.csv").rows
+    assert abs(only.image_roll_deg - only.roll_deg) > 0.5
+    (turned,) = set(re.findall(r"Map, de-rotated by ([+−\d.]+)°", page_of(tmp_path)))
+    assert float(turned.replace("−", "-")) == pytest.approx(only.image_roll_deg, abs=0.006)
