@@ -1,26 +1,30 @@
 """Two runs on one result of parts are told apart before they mix their rows."""
 
+from typing import get_type_hints
+
 import pytest
 
 from rollcli.errors import UsageError
 from rollcli.files.locking import locked_folder
-from rollcli.files.results import Row
+from rollcli.files.results import Row, read_result
 from rollcli.run.batch import BatchOptions, join_results
 from rollcli.run.frame import FrameResult
-from rollcli.run.options import FrameOptions, InputOptions, ResultOptions
+from rollcli.run.options import EstimateOptions, FrameOptions, InputOptions, ResultOptions
 from rollcli.run.plan import make_plan
 from rollcli.run.progress import RunSummary
 from rollcli.run.result import open_output
 from rollcli.run.resume import RunRecord
 from rollcli.run.workers.chunks import Span
-from tests.run.estimate_options import estimate_options
 from tests.run_cli import contents, rollcli, write_maps
 
 
-def options(maps, output):
-    """Those of a run over a folder, in parts of two rows."""
-    result = ResultOptions(output=output, part_rows=2)
-    return estimate_options(inputs=InputOptions((str(maps),)), result=result)
+@pytest.fixture
+def plan(bucket, tmp_path):
+    """The plan of a run over four maps on disk, in parts of two rows in the bucket."""
+    write_maps(tmp_path / "maps", 4)
+    defaults = EstimateOptions(*(kind() for kind in get_type_hints(EstimateOptions).values()))
+    result = ResultOptions(output=f"{bucket}/rolls.csv", part_rows=2)
+    return make_plan(defaults._replace(inputs=InputOptions((str(tmp_path / "maps"),)), result=result))
 
 
 def append(output, frames):
@@ -32,16 +36,7 @@ def append(output, frames):
         output.append([frame], join_results(Span([frame], 0, output.record.read_as), [result], told))
 
 
-@pytest.fixture
-def maps(tmp_path):
-    """Four maps on disk."""
-    write_maps(tmp_path / "maps", 4)
-    return tmp_path / "maps"
-
-
-def test_of_two_runs_in_a_bucket_the_last_to_begin_goes_on_and_the_other_ends(bucket, maps):
-    given = options(maps, f"{bucket}/rolls.csv")
-    plan = make_plan(given)
+def test_of_two_runs_in_a_bucket_the_last_to_begin_goes_on_and_the_other_ends(bucket, plan):
     with open_output(plan) as first, open_output(plan) as last:
         append(first, plan.frames[:1])
         with pytest.raises(UsageError, match="another run has begun to write this result"):
@@ -53,8 +48,6 @@ def test_of_two_runs_in_a_bucket_the_last_to_begin_goes_on_and_the_other_ends(bu
         last.finish(summary)
         with pytest.raises(UsageError, match="another run has begun"):
             first.finish(RunSummary())
-    from rollcli.files.results import read_result
-
     result = read_result(f"{bucket}/rolls.csv")
     assert [row.file for row in result.rows] == [frame.file for frame in plan.frames]
     assert result.run["counts"] == {"frames": 4, "ok": 4, "suspect": 0, "error": 0}
@@ -62,10 +55,8 @@ def test_of_two_runs_in_a_bucket_the_last_to_begin_goes_on_and_the_other_ends(bu
         pass
 
 
-def test_a_run_whose_rows_come_slowly_looks_now_and_then(bucket, maps, monkeypatch):
+def test_a_run_whose_rows_come_slowly_looks_now_and_then(plan, monkeypatch):
     monkeypatch.setattr("rollcli.run.parts._CHECK_S", 0.0)
-    given = options(maps, f"{bucket}/rolls.csv")
-    plan = make_plan(given)
     with open_output(plan) as first:
         append(first, plan.frames[:1])
         with (
@@ -75,9 +66,7 @@ def test_a_run_whose_rows_come_slowly_looks_now_and_then(bucket, maps, monkeypat
             append(first, plan.frames[1:2])  # the part is not full
 
 
-def test_two_runs_that_begin_in_the_same_second_are_told_apart_at_once(bucket, maps, monkeypatch):
-    given = options(maps, f"{bucket}/rolls.csv")
-    plan = make_plan(given)
+def test_two_runs_that_begin_in_the_same_second_are_told_apart_at_once(plan, monkeypatch):
     others = []
     written = RunRecord.write
 
