@@ -144,21 +144,14 @@ def served(answer):
         yield f"http://127.0.0.1:{server.getsockname()[1]}/map.png", asked
 
 
-def drip(start):
+def endless(start, piece=b"x" * 2**20, pause_s=0.0):
+    """An answer that begins so, and gives another piece as long as it is asked."""
+
     def answer(client):
         client.sendall(start)
         while True:
-            client.sendall(b"x")
-            time.sleep(0.1)
-
-    return answer
-
-
-def flood(start):
-    def answer(client):
-        client.sendall(start)
-        while True:
-            client.sendall(b"x" * 2**20)
+            client.sendall(piece)
+            time.sleep(pause_s)
 
     return answer
 
@@ -173,7 +166,7 @@ def flood(start):
 )
 def test_a_server_that_never_ends_is_left_after_the_time_for_the_whole(monkeypatch, start):
     monkeypatch.setenv("ROLLCLI_STORE_TIMEOUT", "1")
-    with served(drip(b"HTTP/1.1 200 OK\r\n" + start)) as (url, asked):
+    with served(endless(b"HTTP/1.1 200 OK\r\n" + start, b"x", 0.1)) as (url, asked):
         began = time.monotonic()
         with pytest.raises(
             InputError, match=r"too long; ROLLCLI_STORE_TIMEOUT sets the seconds .*\(1\), for up to 1 GB$"
@@ -184,7 +177,7 @@ def test_a_server_that_never_ends_is_left_after_the_time_for_the_whole(monkeypat
 
 
 def test_a_server_that_gives_ever_more_is_left_after_the_bytes_that_are_read():
-    with served(flood(b"HTTP/1.1 200 OK\r\n\r\n")) as (url, asked):
+    with served(endless(b"HTTP/1.1 200 OK\r\n\r\n")) as (url, asked):
         with pytest.raises(
             InputError, match=r"has more than 10000000 bytes; up to 9 MB are read, within 60 s \("
         ):
@@ -196,7 +189,7 @@ def test_a_large_object_is_refused_by_what_its_server_says_of_it(monkeypatch):
     size = 100 * GIB
     head = f'HTTP/1.1 200 OK\r\nContent-Length: {size}\r\nETag: "a"\r\n'
     head += "Last-Modified: Mon, 01 Jan 2024 00:00:00 GMT\r\n\r\n"
-    with served(flood(head.encode())) as (url, _):
+    with served(endless(head.encode())) as (url, _):
         with pytest.raises(InputError, match=f"has {size} bytes; up to 1 GB are read, within 60 s"):
             read_bytes(url)
         pytest.importorskip("obstore", reason="obstore, of the extra storage, is not here")

@@ -172,27 +172,13 @@ def _read(line):
     return READ[kind](text.encode().decode("unicode_escape").encode("latin-1"))
 
 
-VALUES = (
-    -math.inf,
-    -1.0,
-    -0.0,
-    1.0,
-    2.0,
-    7.5,
-    16.0,
-    255.0,
-    300.0,
-    32767.0,
-    65534.0,
-    65535.0,
-    math.inf,
-    math.nan,
-)
+VALUES = "-inf -1 -0 1 2 7.5 16 255 300 32767 65534 65535 inf nan"
 
 
 def _to_pixels(kind, **options):
     with np.errstate(invalid="ignore", over="ignore"):
-        kept = [each for each in VALUES if kind[0] == "f" or np.iinfo(kind).min <= each <= np.iinfo(kind).max]
+        every, whole = [*map(float, VALUES.split())], kind[0] != "f"
+        kept = [each for each in every if not whole or np.iinfo(kind).min <= each <= np.iinfo(kind).max]
         values = np.array([kept, kept[::-1]]).astype(kind)
     stored = decode_stored(encode_stored(values, "npy"), "x")
     found = _answer(encodings.to_disparity, stored, **options)

@@ -12,7 +12,7 @@ import pytest
 from rollcli.errors import InputError
 from rollcli.files.codecs import raw_map
 from rollcli.files.formats import decode_image, decode_stored
-from tests.binary_files import make_npy, make_png, make_tiff, png_chunk, png_header, tiff_of_bits
+from tests.binary_files import make_npy, make_png, make_tiff, png_file, png_header, tiff_of_bits
 from tests.run_cli import command, environment
 
 GIB = 2**30
@@ -23,14 +23,8 @@ def png_of(width, height, depth, colour=0, palette=b""):
     packer, channels = zlib.compressobj(9), {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}[colour]
     row = b"\0" + b"\x55" * ((width * depth * channels + 7) // 8)
     data = b"".join(packer.compress(row) for _ in range(height)) + packer.flush()
-    kind, body = png_header(width, height, depth, colour)
-    chunks = [png_chunk(kind, body), png_chunk(b"IDAT", data), png_chunk(b"IEND", b"")]
-    return (
-        b"\x89PNG\r\n\x1a\n"
-        + chunks[0]
-        + (png_chunk(b"PLTE", palette) if palette else b"")
-        + b"".join(chunks[1:])
-    )
+    colours = [(b"PLTE", palette)] if palette else []
+    return png_file(png_header(width, height, depth, colour), *colours, (b"IDAT", data), (b"IEND", b""))
 
 
 def tiff_of(width, height, bits):

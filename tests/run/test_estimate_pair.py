@@ -58,13 +58,8 @@ def test_a_pair_and_its_map_give_the_same_row(pair, form):
     assert [of_map[name] for name in ALIGNMENT_COLUMNS] == [of_pair[name] for name in ALIGNMENT_COLUMNS]
     assert float(of_map["right_larger_percent"]) > 0.05
     assert of_map["status"] == of_pair["status"]
-    for column, within in (
-        ("roll_deg", 0.01),
-        ("roll_ci95_deg", 0.01),
-        ("pitch_deg", 0.01),
-        ("height_m", 0.01),
-    ):
-        assert float(of_map[column]) == pytest.approx(float(of_pair[column]), abs=within)
+    for column in ("roll_deg", "roll_ci95_deg", "pitch_deg", "height_m"):
+        assert float(of_map[column]) == pytest.approx(float(of_pair[column]), abs=0.01)
 
 
 def test_the_call_says_what_the_command_does(pair):

@@ -84,18 +84,8 @@ GATES = {
             partial(_rolled, known(value, 0.25)),
             {"expect_roll": 1.0, "within": within},
         )
-        for value, within in (
-            *(
-                (1.5, 0.5),
-                (0.5, 0.5),
-                (1.75, 0.5),
-                (1.875, 0.5),
-                (1.25, 0.5),
-                (0.75, 0.5),
-                (1.0, 0.0),
-                (-1.0, 0.5),
-            ),
-        )
+        for within, values in ((0.5, (1.5, 0.5, 1.75, 1.875, 1.25, 0.75, -1.0)), (0.0, (1.0,)))
+        for value in values
     },
     **{f"drifted, {end}": (_drifted, {"expect_roll": end, "within": 0.5}) for end in (0.0, 1.0)},
     "drives": (partial(_of_drives, 1.0, 3.0, 1.45, -3.0), {"expect_roll": 1.0, "within": 0.5}),
