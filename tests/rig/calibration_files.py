@@ -21,7 +21,7 @@ class Rig(NamedTuple):
     height: int = 370
 
 
-def _written(form, rig, **others):
+def written(form, rig, **others):
     """The text of a sample with the numbers of a rig in it."""
     bf = rig.fx * rig.baseline
     more = {"right_cx": rig.cx + rig.doffs, "bf": bf, "shift": -bf, "baseline_mm": 1000 * rig.baseline}
@@ -33,18 +33,18 @@ def ros(rig, *, right, positive=False):
     """One of the two files of ROS; `positive` is a sign of the shift that some drivers write."""
     shift = rig.fx * rig.baseline * (1 if positive else -1) if right else 0.0
     side = {"side": "right" if right else "left", "side_cx": rig.cx + (rig.doffs if right else 0)}
-    return _written("ros", rig, side_shift=shift, **side)
+    return written("ros", rig, side_shift=shift, **side)
 
 
-kitti_raw = partial(_written, "kitti-raw")
-kitti_benchmark = partial(_written, "kitti-benchmark")
-driving_stereo = partial(_written, "driving-stereo")
-middlebury = partial(_written, "middlebury")
-opencv_yaml = partial(_written, "opencv-yaml")
-orb_slam = partial(_written, "orb-slam")
-cityscapes = partial(_written, "cityscapes")
-kalibr = partial(_written, "kalibr")
-zed = partial(_written, "zed")
+kitti_raw = partial(written, "kitti-raw")
+kitti_benchmark = partial(written, "kitti-benchmark")
+driving_stereo = partial(written, "driving-stereo")
+middlebury = partial(written, "middlebury")
+opencv_yaml = partial(written, "opencv-yaml")
+orb_slam = partial(written, "orb-slam")
+cityscapes = partial(written, "cityscapes")
+kalibr = partial(written, "kalibr")
+zed = partial(written, "zed")
 
 WHOLE = {
     each.args[0]: each
