@@ -2,6 +2,7 @@
 
 import contextlib
 import functools
+import os
 import shutil
 
 import hypothesis
@@ -49,6 +50,20 @@ def maps(tmp_path, request):
 
     write_maps(tmp_path / "maps", request.module.FRAMES)
     return tmp_path
+
+
+@pytest.fixture
+def synced(monkeypatch):
+    """What was forced to the disk, in order: (inode, size at that time)."""
+    calls, fsync = [], os.fsync
+
+    def watch(descriptor):
+        fsync(descriptor)
+        status = os.fstat(descriptor)
+        calls.append((status.st_ino, status.st_size))
+
+    monkeypatch.setattr(os, "fsync", watch)
+    return calls
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""`rollcli estimate --calib`: pitch and height in the rows, and what is refused before anything runs."""
+"""`rollcli estimate --calib`: pitch and height in the rows, and where the horizon is marked."""
 
 import math
 
@@ -90,3 +90,33 @@ def test_depth_maps_become_the_disparities_of_their_calibration(maps):
     assert [float(row["roll_deg"]) for row in rows_of(level.out)] == pytest.approx([0.0, 0.0], abs=0.05)
     assert rollcli("vdisparity", *depths, "-o", "v", cwd=maps).status == 0
     assert rollcli("derotate", *depths[:3], "--roll", "2", "-o", "turned", cwd=maps).status == 0
+
+
+GREEN = (120, 220, 120)
+
+
+def horizon_on(column, roll):
+    """The row of a column whose ray is level: n K^-1 (u, v, 1) = 0, n the normal of the road."""
+    n = (-math.sin(roll) * math.cos(PITCH), math.cos(roll) * math.cos(PITCH), math.sin(PITCH))
+    return RIG.cy - RIG.fy * (n[0] * (column - RIG.cx) / RIG.fx + n[2]) / n[1]
+
+
+def marked_row(path):
+    """The row with most pixels of the horizon's colour."""
+    picture = cv2.imread(str(path))
+    return int((picture == GREEN).all(axis=2).sum(axis=1).argmax())
+
+
+def test_the_horizon_is_marked_where_the_road_is_infinitely_far_away(tmp_path):
+    roll = math.radians(9)
+    write_kitti(tmp_path / "maps" / "a.png", cast(CALIBRATION, roll, PITCH, HEIGHT))
+    (tmp_path / "calib.txt").write_text(samples.kitti_raw(RIG))
+    calib = ("--calib", "calib.txt")
+    assert rollcli("estimate", "maps", *calib, "--vdisparity", "upright", cwd=tmp_path).status == 0
+    done = rollcli("vdisparity", "maps", *calib, "-o", "as_it_is", cwd=tmp_path)
+    assert (done.status, "no effect" in done.err) == (0, False)
+    middle = horizon_on(159.5, roll)
+    assert marked_row(tmp_path / "as_it_is" / "a.png") == pytest.approx(middle, abs=0.6)
+    # the upright map is turned about its centre, and its horizon is level
+    above = (99.5 - middle) * math.cos(roll)
+    assert marked_row(tmp_path / "upright" / "a.png") == pytest.approx(99.5 - above, abs=0.6)

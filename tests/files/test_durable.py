@@ -13,21 +13,6 @@ from rollcli.files.atomic import sync_files, write_atomic
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows forces no folders")
 
 
-@pytest.fixture
-def synced(monkeypatch):
-    """What was forced to the disk, in order: (inode, size at that time)."""
-    calls = []
-    fsync = os.fsync
-
-    def watch(descriptor):
-        status = os.fstat(descriptor)
-        calls.append((status.st_ino, status.st_size))
-        fsync(descriptor)
-
-    monkeypatch.setattr(os, "fsync", watch)
-    return calls
-
-
 def inode(path):
     return path.stat().st_ino
 

@@ -42,11 +42,11 @@ FURTHER = {
         "cli/test_urls cli/test_buckets cli/test_bad_stores"
     ),
     "pictures": "run/test_recorded run/test_derotate run/test_vdisparity cli/test_heights",
-    "rig": "cli/test_recorded cli/test_calibration cli/test_horizon run/test_diagnosis",
+    "rig": "cli/test_recorded cli/test_calibration run/test_diagnosis",
     "run": (
         "cli/test_recorded files/stores/test_turns cli/test_mistakes cli/test_outputs cli/test_help "
-        "cli/test_frames cli/test_calibration cli/test_horizon cli/test_lost_readers "
-        "cli/test_bad_stores cli/test_urls cli/test_buckets"
+        "cli/test_frames cli/test_calibration cli/test_lost_readers cli/test_bad_stores cli/test_urls "
+        "cli/test_buckets"
     ),
     "simulate": (
         "cli/test_recorded cli/test_mistakes cli/test_simulate cli/test_outputs cli/test_lost_readers "

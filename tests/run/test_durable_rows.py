@@ -20,22 +20,10 @@ class WatchedFile:
 
     def append(self, rows):
         for row in rows.split():
-            self.rows[row] = set(self.forced)
+            self.rows[row] = {inode for inode, _ in self.forced}
 
     def sync(self):
         self.synced = len(self.rows)
-
-
-@pytest.fixture
-def file(monkeypatch):
-    forced, fsync = [], os.fsync
-
-    def watch(descriptor):
-        fsync(descriptor)
-        forced.append(os.fstat(descriptor).st_ino)
-
-    monkeypatch.setattr(os, "fsync", watch)
-    return WatchedFile(forced)
 
 
 def image(folder, number):
@@ -45,7 +33,8 @@ def image(folder, number):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows forces no folders")
-def test_a_row_is_written_after_its_images_and_their_folder_are_on_the_disk(tmp_path, file):
+def test_a_row_is_written_after_its_images_and_their_folder_are_on_the_disk(tmp_path, synced):
+    file = WatchedFile(synced)
     rows = DurableRows(file, WatchedFile([]))
     paths = [image(tmp_path, number) for number in range(40)]
     for number, path in enumerate(paths):
