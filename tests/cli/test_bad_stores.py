@@ -36,6 +36,15 @@ PLACES = {
 }
 
 
+def refusal(folder, *words, **variables):
+    """The one line of a usage error, which shows no secret; nothing was written."""
+    before = contents(folder)
+    said = rollcli(*words, cwd=folder, **variables).refused()
+    assert SECRET not in said
+    assert contents(folder) == before
+    return said
+
+
 @pytest.mark.parametrize(
     ("what", "place"),
     [
@@ -47,42 +56,26 @@ PLACES = {
 )
 def test_what_a_store_objects_to_is_said_before_any_work(bucket, store, tmp_path, what, place):
     reply, said = ANSWERS[what]
-    before = contents(tmp_path)
+    words = [word.replace("@", bucket) for word in PLACES[place]]
     with proxied(store["AWS_ENDPOINT_URL"], lambda *_: reply) as address:
         variables = {"AWS_ENDPOINT_URL": address, "AWS_SECRET_ACCESS_KEY": SECRET}
-        done = rollcli(*(word.replace("@", bucket) for word in PLACES[place]), cwd=tmp_path, **variables)
-    assert (done.status, done.err.count("\n")) == (2, 1), done.err
-    assert said in done.err
-    assert SECRET not in done.err
-    assert contents(tmp_path) == before
+        assert said in refusal(tmp_path, *words, **variables)
 
 
 @pytest.mark.parametrize(
-    ("words", "status", "said"),
+    ("words", "said"),
     [
-        (["estimate", "s3://nowhere/a.png"], 2, "there is no such bucket"),
-        (["estimate", "s3://nowhere/maps/"], 2, "nowhere/maps/: cannot be listed: there is no such bucket"),
-        (["estimate", "s3://maps/empty/"], 2, "no input found in this folder"),
-        (["estimate", "maps", "-o", "s3://nowhere/rolls.csv"], 2, "there is no such bucket"),
-        (["estimate", "maps", "--derotated", "s3://nowhere/up", "--overwrite"], 2, "there is no such bucket"),
-        (["derotate", "maps", "--roll", "1", "-o", "s3://nowhere/up"], 2, "there is no such bucket"),
-        (["estimate", "maps", "--derotated", "https://host/up"], 2, "web servers are read from"),
-        (["estimate", "maps", "-o", "https://host/rolls.csv"], 1, "web servers are read from"),
-        (["estimate", "maps", "-o", "ftp://host/rolls.csv"], 2, "ftp:// is not supported; use s3://"),
-        (["estimate", "maps", "--mask", "gopher://host/mask.png"], 2, "gopher:// is not supported"),
-        (["estimate", "maps", "--calib", "hdfs://host/calib.txt"], 2, "hdfs:// is not supported"),
-        (["estimate", f"s3://me:{SECRET}@maps/a.png"], 2, "keys go into the environment"),
-        (["rig", "s3://maps/none.csv"], 2, "there is no such object"),
-        (["estimate", "maps", "--format", "parquet"], 2, "is a folder of parts: name it with --output"),
+        (["estimate", "s3://nowhere/a.png"], "there is no such bucket"),
+        (["estimate", "s3://nowhere/maps/"], "nowhere/maps/: cannot be listed: there is no such bucket"),
+        (["estimate", "s3://maps/empty/"], "no input found in this folder"),
+        (["estimate", "maps", "-o", "s3://nowhere/rolls.csv"], "there is no such bucket"),
+        (["estimate", "maps", "--derotated", "s3://nowhere/up", "--overwrite"], "there is no such bucket"),
+        (["derotate", "maps", "--roll", "1", "-o", "s3://nowhere/up"], "there is no such bucket"),
+        (["rig", "s3://maps/none.csv"], "there is no such object"),
     ],
 )
-def test_a_wrong_address_is_one_line_before_any_work(bucket, tmp_path, words, status, said):
-    before = contents(tmp_path)
-    done = rollcli(*words, cwd=tmp_path)
-    assert (done.status, done.err.count("\n")) == (status, 1), done.err
-    assert said in done.err
-    assert SECRET not in done.err
-    assert contents(tmp_path) == before
+def test_a_wrong_address_is_one_line_before_any_work(bucket, tmp_path, words, said):
+    assert said in refusal(tmp_path, *words)
 
 
 @pytest.mark.parametrize("place", ["s3://maps/a.png", "s3://maps/"])

@@ -43,18 +43,6 @@ def test_a_pair_whose_views_are_not_level_is_corrected_and_says_so(tmp_path):
     assert half_width > half_width_given  # what was measured has an error of its own
 
 
-def test_swapped_views_and_images_of_two_places_get_a_row_that_says_so(tmp_path):
-    write_pair(tmp_path, "a.png", road_map(0.05, width=320, height=160) / 2)
-    swapped = rollcli("estimate", "--left", "right", "--right", "left", cwd=tmp_path)
-    assert (swapped.status, column(swapped.out, "status")) == (3, ["error"])
-    assert "the views seem swapped" in swapped.out
-
-    grain = np.random.default_rng(5).integers(0, 256, (160, 320), dtype=np.uint8)
-    cv2.imwrite(str(tmp_path / "right" / "a.png"), grain)
-    two_places = rollcli("estimate", "--left", "left", "--right", "right", cwd=tmp_path)
-    assert "the two images do not show the same scene" in two_places.out
-
-
 @pytest.mark.parametrize("options", [(), ("--roi", "0,120,320,200"), ("--road", "all")])
 def test_a_pair_gives_the_same_row_whether_its_whole_map_is_written_or_not(tmp_path, options):
     spec = FrameSpec(scene="street", roll=math.radians(4), size=(320, 240), seed=3)

@@ -1,8 +1,6 @@
 """Heights over the road from the command line, against rendered truth and against the contract."""
 
-import shutil
-from pathlib import Path
-
+import cv2
 import numpy as np
 import pytest
 import tifffile
@@ -11,7 +9,6 @@ from rollcli.simulate.dataset import Dataset, write_dataset
 from rollcli.simulate.spec import FrameSpec
 from tests.run_cli import contents, road_map, rollcli, rows_of, write_kitti
 
-SAMPLES = Path(__file__).resolve().parents[2] / "sample_data"
 RIG = ("--focal", "300", "--principal-point", "79.5,20", "--baseline", "0.5")
 
 
@@ -49,7 +46,7 @@ def test_accuracy_compares_heights_where_truth_has_them(rendered):
     depth_at = {}
     for name in ("frame_0001", "frame_0002"):
         heights, truth = (tifffile.imread(rendered / part / f"{name}.tif") for part in ("out", "heights"))
-        disparity = np.float64(np.asarray(_png(rendered / "disparity" / f"{name}.png"))) / 256
+        disparity = cv2.imread(str(rendered / "disparity" / f"{name}.png"), cv2.IMREAD_UNCHANGED) / 256
         with np.errstate(divide="ignore"):
             depth = 360 * 0.54 / disparity
         for distance in (5, 10, 20):
@@ -74,12 +71,6 @@ def test_heights_of_another_size_do_not_keep_accuracy_from_comparing_angles(tmp_
     assert "no heights are compared: half/frame_0001.tif" in done.err
     assert "differ in size" in done.err
     assert rollcli(*arguments, "--heights", "half", cwd=tmp_path).status == 2
-
-
-def _png(path):
-    import cv2
-
-    return cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
 
 
 def _apart(rendered):
@@ -122,14 +113,3 @@ def test_the_unit_stands_in_the_file_and_npy_is_written_if_asked_for(tmp_path):
     assert np.array_equal(heights, tifffile.imread(tmp_path / "h" / "day" / "a.tif"), equal_nan=True)
     done = rollcli("heights", "maps/day", "--from", "2.csv", "-o", "again", cwd=tmp_path)
     assert "was made with a calibration: give it with --calib" in done.err
-
-
-def test_maps_that_a_run_of_pairs_has_written_are_those_of_its_rows(tmp_path):
-    """Their angles differ: a row is of the road matched along its plane, a map of all that is matched."""
-    for side in ("left", "right"):
-        (tmp_path / "sim" / side).mkdir(parents=True)
-        shutil.copy(SAMPLES / side / "frame_0005.png", tmp_path / "sim" / side)
-    pairs = ("--left", "sim/left", "--right", "sim/right")
-    rollcli("estimate", *pairs, "-o", "out/rolls.csv", "--disparity", "out/maps", cwd=tmp_path)
-    done = rollcli("heights", "out/maps", "--from", "out/rolls.csv", "-o", "high", cwd=tmp_path)
-    assert done.status == 0, done.err

@@ -67,24 +67,6 @@ def test_a_sorted_list_gives_the_bytes_of_one_that_is_read_at_once_also_after_a_
     assert (maps / "rolls.csv").read_bytes() == whole
 
 
-def test_the_mark_that_windows_writes_is_no_part_of_the_first_name(maps):
-    listed = (maps / "list.txt").read_bytes()
-    (maps / "list.txt").write_bytes(b"\xef\xbb\xbf" + listed)
-    done = rollcli("estimate", "--files-from", "list.txt", "--sorted", cwd=maps)
-    files = [row.partition(",")[0] for row in done.out.splitlines()[1:]]
-    assert files == listed.decode().split()
-
-
-@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-be", "print0"])
-def test_a_sorted_list_that_is_no_lines_of_names_is_refused(maps, encoding):
-    text = (maps / "list.txt").read_text()
-    listed = text.replace("\n", "\0").encode() if encoding == "print0" else text.encode(encoding)
-    (maps / "list.txt").write_bytes(listed)
-    done = rollcli("estimate", "--files-from", "list.txt", "--sorted", cwd=maps)
-    assert done.status == 2
-    assert done.err.startswith("rollcli: list.txt: line 1: holds a NUL byte; ")
-
-
 # a program that says how much memory it has taken, kB
 PEAK = """
 import sys

@@ -15,7 +15,6 @@ from tests.run_cli import (
     contents,
     ended,
     environment,
-    keep_rows,
     rollcli,
     started,
     wait_until,
@@ -198,15 +197,6 @@ def test_a_second_run_on_the_same_result_is_refused(folder, monkeypatch):
     assert first.returncode == 3
 
 
-@pytest.fixture
-def interrupted(tmp_path):
-    """A result of 5 of 10 frames."""
-    write_maps(tmp_path / "maps", 10)
-    rollcli("estimate", "maps", "-o", "rolls.csv", cwd=tmp_path)
-    keep_rows(tmp_path / "rolls.csv", 5)
-    return tmp_path
-
-
 @pytest.mark.parametrize("ending", ["csv", "jsonl"])
 def test_a_result_cut_anywhere_is_resumed_to_the_same_bytes(tmp_path, ending):
     names = ['comma, "quote".png', "new\nline.png", "return\rhere.png", "umlaut ü.png", b"no text \xff.png"]
@@ -225,15 +215,6 @@ def test_a_result_cut_anywhere_is_resumed_to_the_same_bytes(tmp_path, ending):
         result.write_bytes(whole[:end])
         assert rollcli("estimate", "maps", "-o", result.name, "--resume", cwd=tmp_path).status == 3
         assert result.read_bytes() == whole
-
-
-@pytest.mark.slow
-def test_other_ways_to_run_do_not_hinder_a_resume(interrupted):
-    done = rollcli(
-        "estimate", "maps", "-o", "rolls.csv", "--resume", "-j2", "-v", "--fail-fast", cwd=interrupted
-    )
-    assert done.status == 0
-    assert (interrupted / "rolls.csv").read_text().count("\n") == 11
 
 
 @pytest.mark.slow
