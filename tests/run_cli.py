@@ -1,13 +1,15 @@
 """The program as a user runs it, and maps for it to read."""
 
+import contextlib
 import csv
 import io
 import os
 import re
 import subprocess
 import sys
+import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -143,6 +145,21 @@ def contents(folder: Path) -> dict[str, bytes]:
     """Every file below a folder, by its relative path."""
     files = (path for path in folder.rglob("*") if path.is_file())
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+@contextlib.contextmanager
+def folder_of(names: Iterable[str]) -> Iterator[None]:
+    """Work in a folder that has these files, some of them links to others, and nothing else."""
+    before = Path.cwd()
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        try:
+            for name, _, target in (each.partition("->") for each in names):
+                Path(name).parent.mkdir(parents=True, exist_ok=True)
+                Path(name).symlink_to(target) if target else Path(name).write_bytes(b"x")
+            yield
+        finally:
+            os.chdir(before)
 
 
 def rows_of(text: str) -> list[dict[str, str]]:

@@ -1,11 +1,9 @@
 """What readers and writers make of small inputs, recorded; see `tests.recorded`."""
 
-import contextlib
 import io
 import math
 import os
 import tarfile
-import tempfile
 import zipfile
 from collections.abc import Iterator
 from functools import partial
@@ -32,6 +30,7 @@ from tests.files.recordings import small_bags
 from tests.files.stores import answers
 from tests.fuzz.corpus import corpus
 from tests.recorded import check
+from tests.run_cli import folder_of
 
 INPUTS = Path(__file__).with_name("inputs.txt").read_text("utf-8").partition("\n\n")[2]
 FILES = {name: data for name, data in corpus().items() if name != "large.png"}
@@ -92,21 +91,6 @@ def _url(name):
     }
 
 
-@contextlib.contextmanager
-def _folder_of(files):
-    """Work in a folder that has these files, some of them links to others, and nothing else."""
-    before = Path.cwd()
-    with tempfile.TemporaryDirectory() as folder:
-        os.chdir(folder)
-        try:
-            for name, _, target in (each.partition("->") for each in files):
-                Path(name).parent.mkdir(parents=True, exist_ok=True)
-                Path(name).symlink_to(target) if target else Path(name).write_bytes(b"x")
-            yield
-        finally:
-            os.chdir(before)
-
-
 def _asked(words):
     """The inputs among the words, and what is asked for by name: `recursive`, `include=PATTERN`, ..."""
     named = [word.partition("=") for word in words if word == "recursive" or "=" in word]
@@ -119,14 +103,14 @@ def _asked(words):
 def _found(files, words):
     inputs, options = _asked(words)
     files_from = options.pop("files_from", None)
-    with _folder_of(files), patch("sys.stdin", io.TextIOWrapper(io.BytesIO())):
+    with folder_of(files), patch("sys.stdin", io.TextIOWrapper(io.BytesIO())):
         found = _answer(lambda: find_inputs(inputs, Search(**options), files_from=files_from))
     return found if isinstance(found, str) else [[each.name, each.relative] for each in found]
 
 
 def _paired(files, words):
     sides, options = _asked(words)
-    with _folder_of(files):
+    with folder_of(files):
         match = options.pop("match", "name")
         found = _answer(lambda: pair_inputs(*sides, Search(IMAGE_ENDINGS, **options), match=match))
     return found if isinstance(found, str) else [[left.name, right.name] for left, right in found]
@@ -134,7 +118,7 @@ def _paired(files, words):
 
 def _columns(data):
     """What the columns of a result hold that numbers are asked of."""
-    with _folder_of([]):
+    with folder_of([]):
         Path("x").write_bytes(data)
         found = _answer(read_columns, "x", ["roll_deg", "height_m"])
     return (
@@ -239,7 +223,7 @@ def _members():
     files = {"noise": np.random.default_rng(1).bytes(500), "d/zeros": bytes(5000)}
     files |= dict.fromkeys((".b", "__MACOSX/c", "d/.e/f"), b"x")
     made, found = {}, {}
-    with _folder_of([]):
+    with folder_of([]):
         for name, packing in (("a.zip", zipfile.ZIP_STORED), ("b.zip", zipfile.ZIP_DEFLATED)):
             with zipfile.ZipFile(name, "w", packing) as file:
                 for each, data in files.items():

@@ -1,6 +1,5 @@
 """What charts of hand-made results hold, how they are drawn, and what pages say; see `tests.recorded`."""
 
-import contextlib
 import html
 import json
 import os
@@ -30,7 +29,7 @@ from rollcli.run.options import EncodingOptions, FrameOptions, ImageOptions
 from tests.recorded import check, made
 from tests.report.results import row
 from tests.run.rigs import known, rig, sequence, short
-from tests.run_cli import road_map
+from tests.run_cli import folder_of, road_map
 
 INPUTS = json.loads(Path(__file__).with_name("inputs.json").read_text("utf-8"))
 RUN, RUNS = INPUTS["run"], INPUTS["runs"]
@@ -344,22 +343,6 @@ def _chosen(count, jumps=(), rows=None):
     return [*choose(rows, count, jumps).items()]
 
 
-@contextlib.contextmanager
-def _folder_of(names):
-    """A folder with such files, some of them links, to work in."""
-    before = Path.cwd()
-    with tempfile.TemporaryDirectory() as folder:
-        for name, _, target in (each.partition("->") for each in names):
-            path = Path(folder, name)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.symlink_to(target) if target else path.touch()
-        os.chdir(folder)
-        try:
-            yield
-        finally:
-            os.chdir(before)
-
-
 def _looked_for(rows, there="", images=None, derotated=None, result="rolls.csv", inside="."):
     """Which files are those of rows, where such files and objects are there."""
     objects = [(each, 9) for each in there.split() if "://" in each]
@@ -367,7 +350,7 @@ def _looked_for(rows, there="", images=None, derotated=None, result="rolls.csv",
     given = [replace(row(left), right_file=right) for left, _, right in pairs]
     with (
         mock.patch.object(sources, "objects_behind", lambda url, recursive: objects if recursive else []),
-        _folder_of(each for each in there.split() if "://" not in each),
+        folder_of(each for each in there.split() if "://" not in each),
     ):
         os.chdir(inside)
         recorded = FrameOptions(images=ImageOptions(derotated=derotated or None))
@@ -383,7 +366,7 @@ def _subjects():
     rows = [row("/run/a.png"), row("b.c.png", -3.0), row("x/../b.png", None), row("m.mp4#000002")]
     rows[0] = replace(rows[0], alpha2=None)
     there = "up/run/a.png heights/a.tif vdisparity/a.png vdisparity/b.c.png disparity/a.npy road_mask/b.png"
-    with _folder_of(f"out/{each}" for each in f"{there} road_mask/m_000002.png".split()):
+    with folder_of(f"out/{each}" for each in f"{there} road_mask/m_000002.png".split()):
         return [
             [each.theta, each.alpha, each.images_only, each.refused, sorted(each.images.items())]
             for each in subjects(

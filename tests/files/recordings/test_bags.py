@@ -91,14 +91,11 @@ def test_views_are_paired_by_their_stamps_never_by_order(tmp_path, kind):
     def make(store):
         for number in range(4):
             stamp = START + number * STEP
-            yield (
-                "/l/image_rect",
-                stamp,
-                image(store, views["left"][number], "mono8", stamp, number, padding=5),
-            )
+            left, right = views["left"][number], views["right"][number]
+            yield "/l/image_rect", stamp, image(store, left, "mono8", stamp, number, padding=5)
             if number != 1:  # dropped
                 late = stamp + 15_000  # as OAK's cameras
-                yield "/r/image_rect", late, image(store, views["right"][number], "mono8", late, number)
+                yield "/r/image_rect", late, image(store, right, "mono8", late, number)
 
     path = write_bag(tmp_path, "drive", kind, make).name
     (tmp_path / "pairs/left/1.png").unlink()
@@ -304,11 +301,8 @@ def test_a_bag_of_several_files_is_one_drive(tmp_path):
                 yield f"/{side}/image_raw", stamp, image(store, view, "mono8", stamp)
                 if number == 0:
                     k = np.diag([350.0, 350, 1]).ravel()
-                    yield (
-                        f"/{side}/camera_info",
-                        stamp,
-                        camera_info(store, stamp, (160, 120), p, [0.1] * 5, k),
-                    )
+                    info = camera_info(store, stamp, (160, 120), p, [0.1] * 5, k)
+                    yield f"/{side}/camera_info", stamp, info
 
         write_bag(tmp_path, f"split_{number}", "mcap", make).rename(folder / f"split_{number}.mcap")
 
@@ -370,11 +364,8 @@ def test_depths_that_are_packed_as_inverses_are_depths(tmp_path):
             depth = np.where(each > 0, 175 / np.maximum(each, 1e-6), np.inf)
             stored = np.where(depth < 50, a / depth + b, 0).round().astype(np.uint16)
             packed = struct.pack("<iff", 0, a, b) + cv2.imencode(".png", stored)[1].tobytes()
-            yield (
-                "/z",
-                START + number,
-                compressed(store, packed, "32FC1; compressedDepth png", START + number),
-            )
+            stamp = START + number
+            yield "/z", stamp, compressed(store, packed, "32FC1; compressedDepth png", stamp)
 
     path = write_bag(tmp_path, "depth", "mcap", make)
     given = ["--topic", "/z", "--encoding", "depth", *camera, "--derotated", tmp_path / "up"]
