@@ -29,6 +29,15 @@ def start(folder, arguments, **streams):
     return subprocess.Popen(command(*arguments), cwd=folder, env=environment(), **streams)
 
 
+def start_without_reader(folder, arguments, stream, **streams):
+    """Start the program with nobody at the other end of one of its streams."""
+    read, write = os.pipe()
+    os.close(read)
+    run = start(folder, arguments, **{stream: write}, **streams)
+    os.close(write)
+    return run
+
+
 NO_DISK = pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
 
 
@@ -55,20 +64,13 @@ def test_a_reader_of_messages_who_is_lost_neither_ends_nor_hides_the_work(maps, 
     "arguments", [["--help"], ["--versions"], ["estimate", "--help"], ["estimate", "maps", "-q"]]
 )
 def test_a_reader_of_answers_who_has_left_ends_the_program_quietly(maps, arguments):
-    read, write = os.pipe()
-    os.close(read)
-    run = start(maps, arguments, stdout=write, stderr=subprocess.PIPE)
-    os.close(write)
+    run = start_without_reader(maps, arguments, "stdout", stderr=subprocess.PIPE)
     _, err = run.communicate(timeout=60)
     assert (run.returncode, err) == (0, b"")
 
 
 def test_an_error_keeps_its_status_when_nobody_reads_its_message(maps):
-    read, write = os.pipe()
-    os.close(read)
-    run = start(maps, ["estimate", "nothing"], stderr=write)
-    os.close(write)
-    assert run.wait(60) == 2
+    assert start_without_reader(maps, ["estimate", "nothing"], "stderr").wait(60) == 2
 
 
 @pytest.mark.slow

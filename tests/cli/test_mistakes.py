@@ -15,6 +15,7 @@ from rollcli.files.results import Row, format_header, format_row
 from rollcli.files.storage import fetch_all
 from tests.run_cli import ROOT, contents, road_map, rollcli, write_kitti, write_pair
 
+FRAMES = 1
 SAMPLES = ROOT / "sample_data"
 TABLE = Path(__file__).with_name("mistakes.txt").read_text("utf-8")
 ANSWERS = re.findall(r"^\$ (.+)\n(\d+): (.+)$", TABLE, flags=re.MULTILINE)
@@ -99,6 +100,22 @@ def test_times_of_parquet_are_no_angles(tmp_path, command, kind, value):
         command, "r.parquet", *(["--svg", "s"] if command == "report" else []), cwd=tmp_path
     ).refused()
     assert "rollcli: r.parquet: " in refusal
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("a = " + "[" * 100_000, "is not TOML: maximum recursion depth exceeded"),
+        ("seed = " + "1" * 5000, "is not TOML: Exceeds the limit"),
+        (".".join(["a"] * 50_000) + " = 1", "is no file of options: it has a key of more than 8 parts"),
+        ("[" + ".".join(['"a"'] * 50_000) + "]", "is no file of options: it has a key of more than 8 parts"),
+    ],
+)
+def test_a_file_of_options_that_was_made_to_harm_is_refused_by_its_name(maps, text, reason):
+    (maps / "rollcli.toml").write_text(text)
+    refusal = rollcli("estimate", "maps", "--config", "rollcli.toml", cwd=maps).refused()
+    assert refusal.startswith("rollcli: rollcli.toml: ")
+    assert reason in refusal
 
 
 @pytest.mark.parametrize("threads", [0, 1])

@@ -1,4 +1,4 @@
-"""The folder that `rollcli simulate` writes, and the samples of the project."""
+"""The folder that `rollcli simulate` writes, the samples of the project, and which rigs can be drawn."""
 
 import math
 from pathlib import Path
@@ -6,13 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rollcli.errors import OutputError
+from rollcli.errors import OutputError, UsageError
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_image
 from rollcli.simulate import dataset as module
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.dataset import plan_dataset, write_dataset
-from rollcli.simulate.options import SimulateOptions
+from rollcli.simulate.options import SCENES, SimulateOptions
+from rollcli.simulate.spec import FrameSpec, draw_specs
 from tests.make_sample_data import EXACT, SAMPLES, SPECS, make
 from tests.run_cli import contents, rows_of
 from tests.true_disparity import true_disparity
@@ -125,3 +126,35 @@ def test_each_map_shows_its_scene_with_the_roll_that_truth_says(stem, spec):
 
 def test_the_samples_are_small():
     assert sum(path.stat().st_size for path in SAMPLES.rglob("*")) < 3e6
+
+
+@pytest.mark.parametrize("pitch_deg", [0, 30])
+def test_the_right_camera_is_above_the_road_just_when_the_baseline_leaves_room(pitch_deg):
+    pitch = math.radians(pitch_deg)
+    lowest = 0.54 * math.sin(math.radians(40)) * math.cos(pitch)
+    FrameSpec(roll=-math.radians(40), pitch=pitch, height=lowest + 1e-6)
+    FrameSpec(roll=math.radians(40), pitch=pitch, height=1e-6)
+    with pytest.raises(UsageError, match="right camera is under the road"):
+        FrameSpec(roll=-math.radians(40), pitch=pitch, height=lowest - 1e-6)
+
+
+def test_without_ranges_the_documented_ones_are_drawn():
+    specs = draw_specs(SimulateOptions(frames=3000, seed=8, cross_section="crown"))
+    for values, low, high in (
+        (np.degrees([spec.roll for spec in specs]), -10, 10),
+        (np.degrees([spec.pitch for spec in specs]), -2, 6),
+        ([100 * spec.crossfall for spec in specs], 1, 4),
+        ([spec.curvature for spec in specs if spec.curvature], -0.001, 0.001),
+    ):
+        span = high - low
+        assert low <= min(values) < low + 0.01 * span
+        assert high - 0.01 * span < max(values) <= high
+    rigs = {(s.height, s.baseline, s.focal, s.noise, s.size, s.kerb, s.gutter, s.centre) for s in specs}
+    assert rigs == {(1.65, 0.54, 371.2, 1.5, (640, 480), (0.1, 0.2), 0.0, (319.5, 239.5))}
+
+
+def test_mixed_draws_every_scene_and_only_a_bare_road_is_always_flat():
+    specs = draw_specs(SimulateOptions(frames=400, seed=2))
+    flat = {kind: np.mean([s.curvature == 0 for s in specs if s.scene == kind]) for kind in SCENES}
+    assert flat.pop("bare") == 1
+    assert all(0.3 < share < 0.7 for share in flat.values())

@@ -1,4 +1,4 @@
-"""Which pairs are refused, by the shares of their blocks that tell."""
+"""Which pairs are refused, and how often others are matched, with matches and measurements that are known."""
 
 from types import SimpleNamespace
 
@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from rollcli.errors import InputError
-from rollcli.stereo import match as same_scene
+from rollcli.stereo import match
 from rollcli.stereo.alignment import Measured
 from rollcli.stereo.first_look import FirstLook
-from rollcli.stereo.misalignment import LEVEL
+from rollcli.stereo.misalignment import LEVEL, Misalignment
 
 ONE, OTHER = np.zeros((8, 8), np.uint8), np.ones((8, 8), np.uint8)
 SAME, SWAPPED, TWO = "image are the same", "the views seem swapped", "do not show the same scene"
@@ -21,11 +21,11 @@ def says(share):
 
 def refusal(monkeypatch, *, textured=(1.0, 1.0), before=0.0, after=0.0, swapped=0.0, views=(ONE, OTHER)):
     shares = iter(textured)
-    monkeypatch.setattr(same_scene, "textured_share", lambda _: next(shares))
-    monkeypatch.setattr(same_scene, "first_look", lambda _: FirstLook(9, says(swapped)))
+    monkeypatch.setattr(match, "textured_share", lambda _: next(shares))
+    monkeypatch.setattr(match, "first_look", lambda _: FirstLook(9, says(swapped)))
     small = SimpleNamespace(views=views, swapped=lambda: None)
     try:
-        same_scene.check_same_scene(small, FirstLook(9, says(before)), says(after))
+        match.check_same_scene(small, FirstLook(9, says(before)), says(after))
     except InputError as error:
         return next(each for each in (SAME, SWAPPED, TWO) if each in str(error))
     return None
@@ -75,3 +75,61 @@ def test_swapped_views_are_those_that_are_matched_the_other_way_round(
 def test_one_image_is_told_from_two_that_are_swapped(monkeypatch):
     assert refusal(monkeypatch, views=(ONE, ONE.copy()), swapped=0.9) == SAME
     assert refusal(monkeypatch, views=(ONE, ONE.copy()), before=0.29) == SAME
+
+
+SHAPE = (200, 300)
+
+
+SURE = Misalignment(0.001, 1e-6, 1e-6, 1e-9)
+
+
+def lies(*values, error=0.0):
+    return Measured(Misalignment(*values), Misalignment(error) if error else SURE, 0.5, 0.1, None)
+
+
+class Rig:
+    """A rig that lies off by so much; each map hides a share of what it was not levelled by."""
+
+    def __init__(self, offset, hidden=0.0, tells=True):
+        self.offset, self.hidden, self.tells = offset, hidden, tells
+        self.matched, self.measured, self.shape = [], [], SHAPE
+
+    @property
+    def closer(self):
+        return self
+
+    def match(self, at):
+        self.matched.append(round(at.offset, 3))
+        return np.full(SHAPE, len(self.matched), np.float32)
+
+    def measure(self, disparity, at, rounds):
+        self.measured.append((int(disparity[0, 0]), rounds))
+        seen = self.offset(at.offset) if callable(self.offset) else self.offset
+        return lies(seen - self.hidden * (seen - at.offset)) if self.tells else None
+
+    def run(self, monkeypatch, look=None, any_scene=False):
+        self.checked = 0
+
+        def check(*_):
+            self.checked += 1
+
+        monkeypatch.setattr(match, "check_same_scene", check)
+        disparity, corrected, self.told, doubt = match._match_levelled(
+            self.match, self, FirstLook(20, look), any_scene
+        )
+        assert disparity[0, 0] == len(self.matched)  # the map of the last match
+        return round(corrected.offset, 3), doubt
+
+
+def test_a_pair_that_runs_away_is_given_up_after_four_matches(monkeypatch):
+    rig = Rig(lambda at: at + 1.0)
+    corrected, doubt = rig.run(monkeypatch, lies(0.0))
+    assert doubt == match.NOT_LEVELLED
+    assert len(rig.matched) == 4
+    assert corrected == rig.matched[-1]  # what was matched, not what would be tried next
+
+
+def test_a_pair_that_a_look_led_astray_is_matched_as_it_is_too(monkeypatch):
+    rig = Rig(lambda at: at + 1.0 if at else 0.0)
+    assert rig.run(monkeypatch, lies(3.0)) == (0, "")
+    assert rig.matched == [3, 4, 0]
