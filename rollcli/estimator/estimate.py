@@ -180,7 +180,7 @@ def estimate_roll(
     A flat road that fills the map, seen by a rig whose right end is up by 3 degrees:
 
     >>> v, u = np.mgrid[:120, :160]
-    >>> road = 60 + 0.3 * (v * math.cos(math.radians(3)) - u * math.sin(math.radians(3)))
+    >>> road = 10 + 0.3 * (v * math.cos(math.radians(3)) - u * math.sin(math.radians(3)))
     >>> estimate = estimate_roll(road)
     >>> estimate.status, round(math.degrees(estimate.theta), 3)
     ('ok', 3.0)

@@ -65,7 +65,7 @@ class CheckedMap:
         if usable is not None and usable.shape != values.shape:
             here, there = ("x".join(map(str, each.shape[::-1])) for each in (usable, values))
             raise UsageError(f"the mask is {here}, the map {there}: give a mask of the map's size")
-        if values.dtype.kind == "f" and not values.max(initial=0) < LARGEST:  # or one is NaN
+        if values.dtype.itemsize > 1 and not values.max(initial=0) < LARGEST:  # or one is NaN
             values = np.where(values >= LARGEST, 0, values)
         valid: NDArray[np.bool_] = values > 0
         if usable is not None:

@@ -148,7 +148,8 @@ def _centred(shape: tuple[int, ...]) -> tuple[Floats, Floats]:
 
 def _validity(values: NDArray[Any], invalid: Iterable[float]) -> Flags:
     valid: Flags = np.isfinite(values) & (values > 0)
-    saturated = [np.iinfo(values.dtype).max] if values.dtype in (np.uint16, np.int16) else []
+    of_16_bits = values.dtype.kind in "iu" and values.dtype.itemsize == 2  # of either byte order
+    saturated = [np.iinfo(values.dtype).max] if of_16_bits else []
     with np.errstate(over="ignore"):  # a value may lie beyond what the dtype holds
         for value in (*invalid, *saturated):
             valid &= values != value

@@ -94,6 +94,8 @@ class Levelled:
         A map of the pair at any size, in its own pixels: a tilt moves near points further.
     search : Search
     find_road : callable or None
+    blank : ndarray of bool, shape (H, W), or None
+        Pixels of the left view that show nothing: what a match finds there is no data.
     """
 
     views: Views
@@ -101,6 +103,7 @@ class Levelled:
     seen: Map | None
     search: Search
     find_road: FindRoad | None
+    blank: NDArray[np.bool_] | None = None
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -127,7 +130,11 @@ class Levelled:
         count = usable_range(width, first, left.shape[1], options.block_size)
         if count < NARROWEST:
             return None
-        return match_views(views, first, count, options.for_smaller(_SMALLER))
+        disparity = match_views(views, first, count, options.for_smaller(_SMALLER))
+        if self.blank is not None:
+            size = left.shape[1], left.shape[0]
+            disparity[cv2.resize(self.blank.view(np.uint8), size, interpolation=cv2.INTER_AREA) != 0] = 0
+        return disparity
 
     @cached_property
     def plane(self) -> Plane | None:
@@ -182,6 +189,14 @@ class Levelled:
 
 
 def match_for_road(pair: Levelled, *, whole: bool = False) -> Map:
+    """Match what an estimate needs, see `_match`; what the left view does not show is no data."""
+    disparity = _match(pair, whole=whole)
+    if pair.blank is not None:
+        disparity[pair.blank] = 0
+    return disparity
+
+
+def _match(pair: Levelled, *, whole: bool) -> Map:
     """Match what an estimate needs: the road, and what lies beside and above it at a part of the size.
 
     Parameters

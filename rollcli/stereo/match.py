@@ -28,7 +28,7 @@ from rollcli.stereo.misalignment import LEVEL, NOTHING_KNOWN, ColumnSupport, Mis
 from rollcli.stereo.options import StereoOptions as StereoOptions
 from rollcli.stereo.refinement import refined
 from rollcli.stereo.sgbm import NARROWEST, usable_range
-from rollcli.stereo.views import Map, prepare_views, shrink
+from rollcli.stereo.views import Map, as_bright, black_border, prepare_views, shrink
 
 # Shares of the textured blocks that tell
 _SURE = 0.3  # from here on the images are what they should be
@@ -259,7 +259,7 @@ def match_pair(
     InputError, UsageError
         See `compute_disparity`.
     """
-    given = prepare_views(left, right)
+    given = as_bright(prepare_views(left, right))
     views = shrink(given[0], options.downscale), shrink(given[1], options.downscale)
     width, first = views[0].shape[1], options.min_disparity
     if usable_range(1, first, width, options.block_size) < NARROWEST:
@@ -274,11 +274,11 @@ def match_pair(
         count = (width // 8 if look.range is None else look.range) - first
     count = usable_range(count, first, width, options.block_size)
 
-    search = Search(first, count, options)
+    search, blank = Search(first, count, options), black_border(views[0])
 
     @lru_cache(maxsize=1)
     def levelled(lies: Misalignment) -> Levelled:
-        return Levelled(views, lies, look.disparity, search, wanted.road)
+        return Levelled(views, lies, look.disparity, search, wanted.road, blank)
 
     pair: Levelled
 
@@ -312,7 +312,9 @@ def match_pair(
     def finished(found: Map) -> Map:
         return _with_believed_columns(refined(found, views, corrected), corrected, support)
 
-    valid = cv2.countNonZero(matched)
+    valid, at_end = cv2.countNonZero(matched), matched >= first + count - 2
+    if pair.road is not None:  # what is matched along the road's plane, no range ends
+        at_end[pair.top :] &= matched[pair.top :] != pair.road.disparity
     whole = None
     if wanted.whole and wanted != _EVERYTHING._replace(whole=True):
         whole = finished(match_for_road(levelled(corrected), whole=True))
@@ -321,7 +323,7 @@ def match_pair(
         whole=whole,
         min_disparity=first,
         num_disparities=count,
-        end_fraction=np.count_nonzero(matched >= first + count - 2) / valid if valid else 0.0,
+        end_fraction=np.count_nonzero(at_end) / valid if valid else 0.0,
         corrected=corrected,
         measured=measured,
         lacks_road=pair.lacks_road,

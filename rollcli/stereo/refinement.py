@@ -77,7 +77,7 @@ def refined(disparity: Floats, views: Views, lies: Misalignment = LEVEL) -> Floa
     result = disparity.copy()
     whole = slice(0, height * BLOCK), slice(0, width * BLOCK)
     cv2.add(disparity[whole], _between(shifts), dst=result[whole], mask=known.view(np.uint8)[whole])
-    return result
+    return np.maximum(result, 0, out=result)  # what is shifted beyond infinity has no disparity
 
 
 class _Planes(NamedTuple):

@@ -39,9 +39,55 @@ def prepare_views(left: NDArray[Any], right: NDArray[Any]) -> Views:
     if left.shape[:2] != right.shape[:2]:
         sizes = " and ".join(f"{each.shape[1]}x{each.shape[0]}" for each in (left, right))
         raise InputError(f"left and right image differ in size: {sizes}")
+    if 0 in left.shape[:2]:
+        raise InputError(f"the images have no pixels: {left.shape[1]}x{left.shape[0]}")
+    left, right = np.asarray(left), np.asarray(right)  # of masked arrays what lies below the mask
     # cameras leave some of 16 bits unused: a fixed shift would make their images black
     brightest = max(int(left.max(initial=1)), int(right.max(initial=1)))
     return _plain(left, brightest), _plain(right, brightest)
+
+
+_EVERY = 8  # rows and columns, of which one tells: enough for quantiles
+_QUANTILES = np.linspace(0.05, 0.95, 19)
+# times as bright, from which on a view is brightened: none of 79 real pairs differs by more. Of 18 streets 4
+# were taken for two scenes where one view was 1.56 times as bright
+_AS_BRIGHT = 1.12
+
+
+def as_bright(views: Views) -> Views:
+    """Brighten the darker view to the other's grey levels, where one was exposed longer: costs compare them.
+
+    Quantiles that are black or white in one of the views tell nothing: they may have been clipped.
+    """
+    levels = [np.sort(each[::_EVERY, ::_EVERY], axis=None) for each in views]
+    places = (_QUANTILES * levels[0].size).astype(np.intp)
+    left, right = (each[places].astype(np.float64) for each in levels)
+    told = (np.minimum(left, right) > 0) & (np.maximum(left, right) < 255)
+    gain = float(np.median(left[told] / right[told])) if told.any() else 1.0
+    if max(gain, 1 / gain) < _AS_BRIGHT:
+        return views
+    brighter = np.minimum(np.rint(np.arange(256) * max(gain, 1 / gain)), 255).astype(np.uint8)
+    if gain > 1:
+        return views[0], brighter[views[1]]
+    return brighter[views[0]], views[1]
+
+
+_BLACK_EDGE = 0.25  # share of an edge of the view: less is a shadow
+_BLACK_AREA = 0.002  # share of the view, of a connected part
+
+
+def black_border(view: View) -> NDArray[np.bool_] | None:
+    """Return the pixels that rectification had no data for: black ones that reach the edge; None for none."""
+    black = view == 0
+    if max(edge.mean() for edge in (black[0], black[-1], black[:, 0], black[:, -1])) < _BLACK_EDGE:
+        return None
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(black.view(np.uint8), connectivity=4)
+    edges = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
+    outer = np.zeros(len(stats), np.bool_)
+    outer[edges] = True
+    outer[0] = False  # what is not black
+    outer &= stats[:, cv2.CC_STAT_AREA] >= _BLACK_AREA * view.size
+    return outer[labels] if outer.any() else None
 
 
 def matched_shape(shape: tuple[int, ...], downscale: float) -> tuple[int, int]:
@@ -234,6 +280,7 @@ def _as_stored(grey: NDArray[Any], like: NDArray[_Number]) -> NDArray[_Number]:
 
 
 def _plain(image: NDArray[Any], brightest: int) -> View:
+    image = image.astype(image.dtype.newbyteorder("="), copy=False)
     if image.dtype not in (np.uint8, np.uint16) or not (image.ndim == 2 or image.shape[2:] == (3,)):
         raise InputError(
             f"an image of {image.dtype} and shape {image.shape} cannot be matched: "

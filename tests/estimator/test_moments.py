@@ -107,3 +107,14 @@ def test_what_is_beyond_the_largest_disparity_is_no_data():
     found = CheckedMap.of(disparity, None)
     assert found.count == 398
     assert found.valid[0, 0]
+
+
+@pytest.mark.parametrize("beyond", [2 * 10**15, 2**63 - 1])
+def test_whole_numbers_beyond_the_largest_disparity_are_no_data_too(beyond):
+    v, u = np.mgrid[:240, :320]
+    numbers = np.rint(np.maximum(128 * (v - 100) - 12.8 * (u - 160), 0)).astype(np.int64)
+    marked = np.where(v <= 100, beyond, numbers)
+
+    found = estimate_roll(marked, Request(road="all"))
+
+    assert found.theta == estimate_roll(np.where(v <= 100, 0, numbers), Request(road="all")).theta

@@ -138,3 +138,11 @@ def test_the_parabola_lies_on_the_road_of_the_derotated_map(roll_deg):
     road = estimate.alpha[0] + estimate.alpha[1] * y + estimate.alpha[2] * y**2
 
     np.testing.assert_allclose(level[:, 150], road, atol=0.01)
+
+
+@pytest.mark.parametrize("dtype", ["<u2", ">u2", "<i2", ">i2"])
+def test_the_largest_number_of_16_bits_is_no_data_in_either_byte_order(dtype):
+    values = np.full((60, 80), 1000, dtype)
+    values[25:35, 35:45] = np.iinfo(values.dtype).max
+
+    assert derotate(values, math.radians(5)).max() == 1000

@@ -1,6 +1,7 @@
 """Where only the angle is wanted, a pair's road is matched along its plane: as right as the whole match."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -13,6 +14,7 @@ from rollcli.files.formats import read_image
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
+from rollcli.stereo import match as matching
 from rollcli.stereo.match import StereoOptions, Wanted, compute_disparity, match_pair
 from tests.odd_views import find_road, seen_by
 from tests.true_disparity import true_disparity
@@ -181,3 +183,38 @@ def test_a_wide_view_is_matched_over_a_wider_range():
     bent = truth - 20 - 0.3 * v > 7
     off = np.abs(found - truth[:, None])[bent]
     assert (off < 0.1).mean() > 0.7
+
+
+def test_a_road_found_along_its_plane_beyond_the_range_is_not_at_its_end(street, monkeypatch):
+    looked = matching.first_look
+    monkeypatch.setattr(matching, "first_look", lambda small: replace(looked(small), range=56))
+    found = match_pair(street.left, street.right, StereoOptions(), ROAD)
+
+    assert found.disparity.max() > found.num_disparities + 10
+    assert found.end_fraction < 0.05
+
+
+@pytest.mark.parametrize("border", [(0, 60), (60, 60)])
+def test_black_borders_of_views_are_no_data_and_the_road_is_found(street, border):
+    left, right = (
+        cv2.copyMakeBorder(each, *border, 40, 40, cv2.BORDER_CONSTANT) for each in (street.left, street.right)
+    )
+    found = match_pair(left, right, StereoOptions(), ROAD)
+    estimate = estimate_roll(found.disparity)
+
+    assert not found.disparity[-60:].any()
+    assert estimate.status == "ok"
+    assert math.degrees(estimate.theta) == pytest.approx(4, abs=0.1)
+
+
+@pytest.mark.skipif(not LIDAR.is_dir(), reason="no real pairs with lidar at ../shared/lidar")
+def test_a_street_of_which_one_view_was_exposed_half_as_long_has_much_the_same_roll():
+    left, right = (
+        cv2.imread(str(LIDAR / side / "000002.png"), cv2.IMREAD_GRAYSCALE) for side in ("left", "right")
+    )
+    same, darker = (
+        estimate_roll(match_pair(each, right, StereoOptions(), ROAD).disparity) for each in (left, left // 2)
+    )
+
+    assert darker.status == same.status
+    assert math.degrees(darker.theta) == pytest.approx(math.degrees(same.theta), abs=0.1)

@@ -6,6 +6,8 @@ import pytest
 
 from rollcli.errors import InputError
 from rollcli.stereo.views import (
+    as_bright,
+    black_border,
     matched_shape,
     prepare_views,
     sampled,
@@ -122,3 +124,45 @@ def test_what_is_halfway_between_two_grey_levels_is_rounded_up_in_every_column()
     smooth = (down[:, :-2] + 6 * down[:, 1:-1] + down[:, 2:]) / 8
 
     np.testing.assert_array_equal(smoothed_at_pixels(view), np.floor(smooth + 0.5))
+
+
+@pytest.mark.parametrize(("left", "right"), [(1.0, 0.5), (0.4, 1.0), (0.7, 1.3)])
+def test_a_view_that_was_exposed_less_is_brightened_to_the_other(left, right):
+    grey = cv2.GaussianBlur(np.random.default_rng(0).integers(0, 256, (60, 80), dtype=np.uint8), (0, 0), 1.5)
+
+    one, other = as_bright(tuple(np.minimum(grey * by, 255).astype(np.uint8) for by in (left, right)))
+
+    np.testing.assert_allclose(one.astype(int), other.astype(int), atol=4)
+
+
+def test_views_that_are_about_as_bright_stay_as_they_are():
+    grey = np.random.default_rng(0).integers(20, 200, (60, 80), dtype=np.uint8)
+    views = grey, (grey * 1.1).astype(np.uint8)
+
+    assert all(a is b for a, b in zip(as_bright(views), views, strict=True))
+
+
+def test_black_that_reaches_the_edge_is_the_border():
+    view = np.full((60, 80), 90, np.uint8)
+    view[20:30, 30:40] = 0
+    assert black_border(view) is None
+    view[-10:] = 0
+    view[:, :3] = 0
+    border = black_border(view)
+    assert border is not None
+    assert border[-10:].all()
+    assert border[:, :3].all()
+    assert border.sum() == 10 * 80 + 3 * 50
+
+
+def test_either_byte_order_of_16_bits_is_read():
+    view = np.random.default_rng(0).integers(0, 4096, (6, 7)).astype("<u2")
+    plain = prepare_views(view, view)
+
+    np.testing.assert_array_equal(prepare_views(view.astype(">u2"), view.astype(">u2")), plain)
+
+
+def test_images_without_pixels_are_refused():
+    nothing = np.zeros((0, 100), np.uint8)
+    with pytest.raises(InputError, match="no pixels: 100x0"):
+        prepare_views(nothing, nothing)
