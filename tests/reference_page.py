@@ -14,7 +14,8 @@ HEAD = """# Python reference
 `import rollcli` loads nothing else; each name loads when it is first used. Arrays in, frozen dataclasses
 out. Angles are radians; degrees only where a name says `_deg`. What is wrong with a file, an array or a
 number is an error that derives from `RollcliError` and says in one line what to do; an argument of another
-type than documented may raise Python's own. Before each example go `import numpy as np` and `from rollcli import *`.
+type than documented may raise Python's own. Before each example go `import numpy as np` and
+`from rollcli import *`.
 
 The functions keep no state of their own: threads may call them at the same time. OpenCV divides one match
 among its own threads; for many frames, processes (or the command's `--jobs`) use a machine better.
