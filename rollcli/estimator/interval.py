@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.estimator.moments import Floats, Grid, regular, solve_normal
+from rollcli.estimator.least_squares import regular, solve_normal, unit
+from rollcli.estimator.moments import Floats, Grid
 from rollcli.estimator.road.model import Reals, RoadModel
 from rollcli.estimator.road.surface import Surface
 from rollcli.estimator.tuning import IntervalTuning
@@ -243,7 +244,7 @@ def _solved(total: Floats, groups: Floats, prior: float) -> tuple[Floats, Floats
     products[:6] = products[-1] = total
     np.subtract(total, groups, out=products[6:-1])
     normal, pulls = products[:, :5, :5], products[:, :5, 5:]
-    pulls[:5, :, 0] = np.eye(5)  # whose solutions are the inverse
+    pulls[:5, :, 0] = unit(5)  # whose solutions are the inverse
     pulls[-1] = normal[-1, :, _CAMBER:]
     pulls[-1, _CAMBER] = 0
     normal[:-1, _CAMBER, _CAMBER] += prior

@@ -1,4 +1,4 @@
-"""A map that can be estimated, the 22 sums that every solver works on, in one pass, and normal equations.
+"""A map that can be estimated, and the 22 sums that every solver works on, in one pass over its pixels.
 
 `y^k` of the rotated frame is a binomial in `u` and `v`, so the energy of [GD] eq. 9 at ANY angle is a
 combination of ``sum w u^i v^j`` (i + j <= 4), ``sum w d u^i v^j`` (i + j <= 2) and ``sum w d^2``.
@@ -242,48 +242,3 @@ def to_powers_of_sum(offsets: Floats) -> Floats:
     """Return the matrices from powers of x to powers of x + offset, for each offset: shape (B, 5, 5)."""
     matrices: Floats = _CHOOSE * powers(offsets).T[:, _REST]
     return matrices
-
-
-# least squares of a few parameters in different units, some of which may be missing
-_RIDGE = 1e-10  # of each diagonal element: a parameter that the pixels do not determine stays finite
-_LEAST = 1e-200  # of a diagonal element, by which a row of zeros can be divided
-
-
-def solve_normal(normal: Floats, pull: Floats) -> Floats:
-    """Solve normal equations.
-
-    Parameters
-    ----------
-    normal : ndarray, shape (..., N, N)
-        Where a parameter is missing, its row and column are 0.
-    pull : ndarray, shape (..., N)
-        The right-hand sides.
-
-    Returns
-    -------
-    ndarray, shape (..., N)
-        0 for what is missing.
-    """
-    ridge = np.eye(normal.shape[-1])
-    return np.asarray(
-        np.linalg.solve(normal * (1 + _RIDGE * ridge) + _LEAST * ridge, pull[..., None])[..., 0]
-    )
-
-
-def regular(normal: Floats, like: Floats) -> Floats:
-    """Return normal matrices that can be inverted though parameters are missing, or not determined.
-
-    Parameters
-    ----------
-    normal : ndarray, shape (..., N, N)
-        Where a parameter is missing, its row and column are 0, and the solution is.
-    like : ndarray, shape (N, N)
-        A normal matrix of such parameters, for their units.
-
-    Returns
-    -------
-    ndarray, shape (..., N, N)
-    """
-    diagonal = like.diagonal()
-    added: Floats = np.where(diagonal > 0, _RIDGE * diagonal, 1.0) * np.eye(len(diagonal))
-    return normal + added
