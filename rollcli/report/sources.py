@@ -186,9 +186,7 @@ class _ImageFolder:
 
 
 def _images(row: Row, images: _ImageFolder, recorded: ImageOptions) -> dict[str, str]:
-    # a run that has written images has written no other kinds: what has their names is another's
-    kinds = [kind for kind, _ in recorded.folders()] or KINDS
-    return {kind.name: path for kind in kinds if (path := _image(kind, row, images, recorded))}
+    return {kind.name: path for kind in KINDS if (path := _image(kind, row, images, recorded))}
 
 
 def _image(kind: ImageKind, row: Row, images: _ImageFolder, recorded: ImageOptions) -> str | None:
