@@ -43,8 +43,19 @@ def prepare_views(left: NDArray[Any], right: NDArray[Any]) -> Views:
         raise InputError(f"the images have no pixels: {left.shape[1]}x{left.shape[0]}")
     left, right = np.asarray(left), np.asarray(right)  # of masked arrays what lies below the mask
     # cameras leave some of 16 bits unused: a fixed shift would make their images black
-    brightest = max(int(left.max(initial=1)), int(right.max(initial=1)))
+    brightest = max(_brightest(left), _brightest(right))
     return _plain(left, brightest), _plain(right, brightest)
+
+
+_HOT = 10_000  # pixels, of which one may be brighter than white: some of a sensor are defect
+
+
+def _brightest(image: NDArray[Any]) -> int:
+    """Return the brightest of 16 bits but for defect pixels, at least 1."""
+    if image.dtype.kind != "u" or image.dtype.itemsize != 2:  # of 8 bits, or refused
+        return 1
+    last = image.size - 1 - image.size // _HOT
+    return max(1, int(np.partition(image, last, axis=None)[last]))
 
 
 _EVERY = 8  # rows and columns, of which one tells: enough for quantiles
@@ -57,34 +68,60 @@ _AS_BRIGHT = 1.12
 def as_bright(views: Views) -> Views:
     """Brighten the darker view to the other's grey levels, where one was exposed longer: costs compare them.
 
-    Quantiles that are black or white in one of the views tell nothing: they may have been clipped.
+    Cameras may differ in gain, in offset and in gamma: a curve through quantiles of both takes up all three.
+    Those that are black or white in one of the views tell nothing: they may have been clipped. Nor does the
+    border of either view, which the other may not have.
     """
-    levels = [np.sort(each[::_EVERY, ::_EVERY], axis=None) for each in views]
+    shown = np.ones(views[0].shape, np.bool_)
+    for each in views:
+        if (border := black_border(each)) is not None:
+            shown &= ~border
+    levels = [np.sort(each[::_EVERY, ::_EVERY][shown[::_EVERY, ::_EVERY]]) for each in views]
+    if not levels[0].size:
+        return views
     places = (_QUANTILES * levels[0].size).astype(np.intp)
     left, right = (each[places].astype(np.float64) for each in levels)
     told = (np.minimum(left, right) > 0) & (np.maximum(left, right) < 255)
     gain = float(np.median(left[told] / right[told])) if told.any() else 1.0
     if max(gain, 1 / gain) < _AS_BRIGHT:
         return views
-    brighter = np.minimum(np.rint(np.arange(256) * max(gain, 1 / gain)), 255).astype(np.uint8)
     if gain > 1:
-        return views[0], brighter[views[1]]
-    return brighter[views[0]], views[1]
+        return views[0], _brighter(right[told], left[told])[views[1]]
+    return _brighter(left[told], right[told])[views[0]], views[1]
+
+
+def _brighter(dark: NDArray[np.float64], bright: NDArray[np.float64]) -> View:
+    """Return what each grey level becomes, from quantiles of both views: straight between them.
+
+    Below the first and above the last, as many times as bright as these become.
+    """
+    at, same = np.unique(dark, return_inverse=True)
+    to = np.bincount(same, bright) / np.bincount(same)
+    at, to = np.append(at, 256), np.append(to, 256 * to[-1] / at[-1])
+    curve = np.interp(np.arange(256), np.append(0, at), np.append(0, to))
+    levels: View = np.minimum(np.rint(curve), 255).astype(np.uint8)
+    return levels
 
 
 _BLACK_EDGE = 0.25  # share of an edge of the view: less is a shadow
+_DARK = 128  # grey level; skies are brighter, and of one level where they are overexposed
 _BLACK_AREA = 0.002  # share of the view, of a connected part
 
 
 def black_border(view: View) -> NDArray[np.bool_] | None:
-    """Return the pixels that rectification had no data for: black ones that reach the edge; None for none."""
-    black = view == 0
+    """Return the pixels that rectification had no data for: black ones that reach the edge; None for none.
+
+    A dark edge of one grey level throughout is black, too: bars of videos have 16 of it.
+    """
+    edges = view[0], view[-1], view[:, 0], view[:, -1]
+    level = min((int(edge[0]) for edge in edges if edge[0] < _DARK and (edge == edge[0]).all()), default=0)
+    black = view == level
     if max(edge.mean() for edge in (black[0], black[-1], black[:, 0], black[:, -1])) < _BLACK_EDGE:
         return None
     _, labels, stats, _ = cv2.connectedComponentsWithStats(black.view(np.uint8), connectivity=4)
-    edges = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
+    at_edge = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
     outer = np.zeros(len(stats), np.bool_)
-    outer[edges] = True
+    outer[at_edge] = True
     outer[0] = False  # what is not black
     outer &= stats[:, cv2.CC_STAT_AREA] >= _BLACK_AREA * view.size
     return outer[labels] if outer.any() else None

@@ -194,10 +194,11 @@ def test_a_road_found_along_its_plane_beyond_the_range_is_not_at_its_end(street,
     assert found.end_fraction < 0.05
 
 
-@pytest.mark.parametrize("border", [(0, 60), (60, 60)])
-def test_black_borders_of_views_are_no_data_and_the_road_is_found(street, border):
+@pytest.mark.parametrize(("border", "level"), [((0, 60), 0), ((60, 60), 0), ((60, 60), 16)])
+def test_black_borders_of_views_are_no_data_and_the_road_is_found(street, border, level):
     left, right = (
-        cv2.copyMakeBorder(each, *border, 40, 40, cv2.BORDER_CONSTANT) for each in (street.left, street.right)
+        cv2.copyMakeBorder(each, *border, 40, 40, cv2.BORDER_CONSTANT, value=level)
+        for each in (street.left, street.right)
     )
     found = match_pair(left, right, StereoOptions(), ROAD)
     estimate = estimate_roll(found.disparity)

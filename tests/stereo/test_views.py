@@ -135,6 +135,40 @@ def test_a_view_that_was_exposed_less_is_brightened_to_the_other(left, right):
     np.testing.assert_allclose(one.astype(int), other.astype(int), atol=4)
 
 
+@pytest.mark.parametrize(
+    "other_camera",
+    [
+        lambda grey: 255 * (grey / 255) ** 0.6,
+        lambda grey: 255 * (grey / 255) ** 1.5,
+        lambda grey: grey + 30.0,
+        lambda grey: np.maximum(grey - 30.0, 0),
+        lambda grey: 0.5 * grey + 90,
+    ],
+)
+@pytest.mark.parametrize("swapped", [False, True])
+def test_a_view_of_another_gamma_or_offset_gets_the_others_grey_levels(other_camera, swapped):
+    grey = cv2.GaussianBlur(
+        np.random.default_rng(0).integers(0, 256, (120, 160), dtype=np.uint8), (0, 0), 1.5
+    )
+    views = grey, np.rint(other_camera(grey)).astype(np.uint8)
+
+    one, other = as_bright(views[::-1] if swapped else views)
+
+    # one in 20 is darker than the first quantile, one brighter than the last
+    assert np.percentile(np.abs(one.astype(int) - other), 88) <= 4
+
+
+@pytest.mark.parametrize("level", [0, 16])
+def test_a_border_of_one_view_alone_makes_no_view_brighter(level):
+    grey = np.random.default_rng(0).integers(60, 200, (120, 160), dtype=np.uint8)
+    bordered = grey.copy()
+    bordered[-50:] = level
+    views = grey, bordered
+
+    assert all(a is b for a, b in zip(as_bright(views), views, strict=True))
+    assert all(a is b for a, b in zip(as_bright(views[::-1]), views[::-1], strict=True))
+
+
 def test_views_that_are_about_as_bright_stay_as_they_are():
     grey = np.random.default_rng(0).integers(20, 200, (60, 80), dtype=np.uint8)
     views = grey, (grey * 1.1).astype(np.uint8)
@@ -143,7 +177,7 @@ def test_views_that_are_about_as_bright_stay_as_they_are():
 
 
 def test_black_that_reaches_the_edge_is_the_border():
-    view = np.full((60, 80), 90, np.uint8)
+    view = np.random.default_rng(0).integers(60, 200, (60, 80), dtype=np.uint8)
     view[20:30, 30:40] = 0
     assert black_border(view) is None
     view[-10:] = 0
@@ -153,6 +187,30 @@ def test_black_that_reaches_the_edge_is_the_border():
     assert border[-10:].all()
     assert border[:, :3].all()
     assert border.sum() == 10 * 80 + 3 * 50
+
+
+def test_a_dark_edge_of_one_level_is_the_border_and_a_white_sky_is_not():
+    view = np.random.default_rng(0).integers(20, 250, (60, 80), dtype=np.uint8)
+    assert black_border(view) is None
+    view[:15] = 255
+    assert black_border(view) is None
+    view[-10:] = 16
+    border = black_border(view)
+    assert border is not None
+    assert border[-10:].all()
+    assert border.sum() == 10 * 80
+
+
+def test_a_defect_pixel_of_16_bits_makes_no_view_dark():
+    view = np.random.default_rng(0).integers(0, 4096, (120, 160)).astype(np.uint16)
+    defect = view.copy()
+    defect[50, 60] = 65535
+
+    plain, found = prepare_views(view, view)[0], prepare_views(defect, view)
+
+    for each in found:
+        different = np.abs(each.astype(int) - plain) > 1
+        assert different.sum() <= 1
 
 
 def test_either_byte_order_of_16_bits_is_read():
