@@ -90,7 +90,8 @@ class _Ground(NamedTuple):
     filled : float
         Of all pixels with data, those on the plane.
     below : float
-        Of the lane's pixels those below the plane: the most in any band within twice the reach.
+        Of the lane's pixels those below the plane: the most in any band within twice the reach, from where
+        more are on it.
     beyond : float
         Of the pixels with data from the reach to twice as far, those on the plane; 1 where few have data.
     """
@@ -139,8 +140,12 @@ def _ground_of(checked: CheckedMap, surface: Surface, rmse: float, reach: float)
     near = road * (1 / nearest)  # 1 at the lower border, 0 at the horizon
     at_reach = wide / reach
     bands = np.clip(near * _BANDS, 0, _BANDS - 1).astype(np.intp)
-    in_lane, lower = (np.bincount(bands[those], minlength=_BANDS) for those in (lane, lane & below))
-    some = (in_lane >= _FEW) & (np.arange(_BANDS) + 0.5 >= _BANDS / 2 * at_reach)
+    in_lane, lower, on = (
+        np.bincount(bands[those], minlength=_BANDS) for those in (lane, lane & below, lane & on_road)
+    )
+    # a plane ends where it has begun: a border, or an own bonnet, that is seen nearer is no end ahead
+    begun = np.logical_or.accumulate((on > lower)[::-1])[::-1]
+    some = begun & (in_lane >= _FEW) & (np.arange(_BANDS) + 0.5 >= _BANDS / 2 * at_reach)
     begins = max(at_reach, 2 * farthest / nearest)
     ahead = (near < begins) & (near > begins / 2)
     seen = valid & ahead

@@ -108,6 +108,16 @@ def test_a_road_that_fills_the_map_is_beyond_doubt(roll_deg):
     assert (estimate.status, estimate.message) == ("ok", "")
 
 
+@pytest.mark.parametrize("rows", [5, 10, 20])
+def test_a_border_of_small_disparities_below_the_road_is_no_end_of_it(rows):
+    bordered = with_noise(road(4))
+    bordered[-rows:] = 1
+
+    estimate = estimate_roll(bordered)
+
+    assert (estimate.status, estimate.message) == ("ok", "")
+
+
 def test_what_a_car_leaves_of_the_road_gives_an_angle_beyond_doubt():
     estimate = estimate_roll(behind_a_car())
 

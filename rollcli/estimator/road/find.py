@@ -19,10 +19,11 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.least_squares import solve_normal
 from rollcli.estimator.moments import Floats, Singles
 from rollcli.estimator.road.model import RoadModel
-from rollcli.estimator.road.sample import Sample, every, quantile, take_sample
+from rollcli.estimator.road.sample import Sample, every, quantile, take_sample, values_at
 from rollcli.estimator.tuning import TUNING, SearchTuning, Tuning
 
 HARDLY_A_PIXEL = "no road: hardly a pixel lies on the best plane that was found"
+_SPARSE = 0.1  # of the pixels have neighbours at most, where these are too few to tell a road
 _FITS = 2  # of each plane that is judged again
 
 
@@ -103,6 +104,13 @@ def find_road(sample: Sample, max_roll: float, seed: int, tuning: Tuning) -> Roa
 
 def _why_no_plane(sample: Sample, max_roll: float) -> str:
     """Say why no plane through the pixels can be a road."""
+    row = sample.reach * sample.disparity.shape[1]
+    beside = values_at(sample.places[sample.few] + np.array([[-row], [row]]), sample.disparity) > 0
+    if (share := beside.any(0).mean()) < _SPARSE:
+        return (
+            f"no road: the map is too sparse: {share:.0%} of its pixels with data have others {sample.reach} "
+            "px above or below them"
+        )
     if (sample.slopes[1] > 0).mean() < 0.5:  # noise alone rises at some pixels
         return "no road: nowhere does the disparity grow downward, as it does on a road"
     return (

@@ -341,3 +341,11 @@ def test_a_road_without_road_finding_is_beyond_doubt(model):
 
     assert (found.status, found.message) == ("ok", "")
     assert found.road_fraction == 1
+
+
+def test_a_map_whose_pixels_have_no_neighbours_is_said_to_be_sparse():
+    dots = np.zeros((480, 640))
+    dots[::9, ::9] = flat_road(2, width=640, height=480, focal=560.0)[::9, ::9]
+
+    with pytest.raises(EstimationError, match="too sparse: 0% of its pixels with data have others 2 px"):
+        estimate_roll(dots)
