@@ -181,7 +181,7 @@ def paper_page(
         title=f"The paper's experiments on {len(found)} map{'' if len(found) == 1 else 's'}",
         version=__version__,
         deltas=DELTAS_DEG,
-        solvers=SOLVER_NAMES,
+        solvers={solver: SOLVER_NAMES[solver] for solver in PAPER_ITERATIONS},
         methods=METHOD_NAMES,
         tables=tables,
         charts=charts,

@@ -100,9 +100,7 @@ class Calibrations:
         fetched: dict[str, bytes] = {}
         if len(given.calib) == 1 and is_place(given.calib[0]):
             files = _files(given.calib[0])
-            self._by_stem = {}
-            for path in files:
-                self._by_stem.setdefault(PurePosixPath(path).stem.removesuffix(_MARK), []).append(path)
+            self._by_stem = _gathered((PurePosixPath(path).stem.removesuffix(_MARK), path) for path in files)
             fetched = fetch_all(filter(is_url, files), MAX_BYTES)  # one after the other takes long
         elif given.given:
             self._one = _read(given.calib, given)
@@ -118,10 +116,22 @@ class Calibrations:
             shorter = shorter.rpartition("_")[0]
             if not shorter:
                 raise UsageError(f"{name}: has no calibration of its name in {folder}")
-        paths = self._by_stem[shorter]
-        if len(paths) > 1:
-            raise UsageError(f"{name}: has more than one calibration of its name: {paths[0]}, {paths[1]}")
-        return self._read(paths[0])
+        return self._read(_only(self._by_stem[shorter], "calibration", name))
+
+
+def _gathered(files: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
+    """Gather paths by their stems."""
+    found: dict[str, list[str]] = {}
+    for stem, path in files:
+        found.setdefault(stem, []).append(path)
+    return found
+
+
+def _only(paths: Sequence[str], what: str, name: str) -> str:
+    """Return the one path of a stem; which of several is meant for a frame, nobody can tell."""
+    if len(paths) > 1:
+        raise UsageError(f"{name}: has more than one {what} of its name: {paths[0]}, {paths[1]}")
+    return paths[0]
 
 
 def calibration_files(given: CalibrationOptions) -> list[str]:
@@ -424,9 +434,7 @@ class _FrameMaker:
         self._masks: dict[str, list[str]] | None = None
         if self._mask is not None and is_place(self._mask):
             found = find_inputs([self._mask], Search(recursive=True))
-            self._masks = {}
-            for each in found:
-                self._masks.setdefault(Path(frame_name(each.name)).stem, []).append(each.location)
+            self._masks = _gathered((Path(frame_name(each.name)).stem, each.location) for each in found)
         elif self._mask is not None and not (is_url(self._mask) or is_file(self._mask)):
             raise UsageError(f"{self._mask}: no such mask file or folder")
 
@@ -434,12 +442,9 @@ class _FrameMaker:
         """Make the frame of a map, or of the views of a pair; `calibration` is that of its bag."""
         mask, stem = self._mask, PurePath(frame_name(left.name)).stem
         if self._masks is not None:
-            masks = self._masks.get(stem, [])
-            if not masks:
+            if stem not in self._masks:
                 raise UsageError(f"{left.name}: has no mask of its name in {self._mask}")
-            if len(masks) > 1:
-                raise UsageError(f"{left.name}: has more than one mask of its name: {masks[0]}, {masks[1]}")
-            mask = masks[0]
+            mask = _only(self._masks[stem], "mask", left.name)
         # what is made of an input must stay in its folder, whatever a store or an archive calls it
         foreign = is_url(left.location) or file_of(left.location) != left.location
         return Frame(
