@@ -22,6 +22,7 @@ from rollcli.estimator import estimate
 from rollcli.estimator.request import Request
 from rollcli.rig.calibration import Calibration
 from tests import typed_client
+from tests.estimator.synthetic_maps import banked_road
 from tests.reference_page import PAGE, page
 from tests.run_cli import ROOT
 from tests.run_cli import rollcli as run
@@ -100,6 +101,14 @@ def test_a_calibration_may_be_the_path_of_its_file(disparity):
     assert rollcli.estimate_pair(left, right, calibration=str(CALIB)).height_m > 1
 
 
+def test_of_a_cropped_map_the_lane_is_the_one_below_the_principal_point():
+    cropped = banked_road(2, cropped=200)
+    rig = Calibration(360, 360, 110, 94, 0.5)
+
+    assert abs(rollcli.estimate_roll(cropped, calibration=rig).image_roll_deg - 2) < 0.02
+    assert abs(rollcli.estimate_roll(cropped).roll_deg - 2) > 1
+
+
 def test_what_is_no_calibration_is_said(disparity):
     estimate = rollcli.estimate_roll(disparity)
     for call in (
@@ -123,7 +132,9 @@ def test_each_setting_of_the_estimator_has_its_default_and_reaches_it(monkeypatc
     for call, *views in ((rollcli.estimate_roll, view), (rollcli.estimate_pair, view, np.roll(view, -10, 1))):
         named = inspect.signature(call).parameters
         given = {name: value for name, value in asked.items() if name in named}
-        assert asked.keys() - named.keys() - {"tuning"} == ({"slope_error"} if len(views) == 2 else set())
+        assert asked.keys() - named.keys() - {"tuning", "middle"} == (
+            {"slope_error"} if len(views) == 2 else set()
+        )
         assert named.keys() - asked.keys() <= own
         assert all(named[name].default == getattr(Request(), name) for name in given)
         with pytest.raises(rollcli.EstimationError, match="refused"):

@@ -104,6 +104,9 @@ class Request:
         road's: what is left of it where the views of a pair were levelled (`StereoMatch.slope_error`).
     seed : int
         Of road finding.
+    middle : float or None
+        Column that looks straight ahead, px: the principal point's, which a crop moves away from the
+        middle of the map. None: that middle.
     tuning : Tuning
         The estimator's tuned numbers; to study what they do.
 
@@ -122,6 +125,7 @@ class Request:
     max_interval: float = math.radians(MAX_INTERVAL_DEG)
     slope_error: float = 0.0
     seed: int = 0
+    middle: float | None = None
     tuning: Tuning = TUNING
 
     def __post_init__(self) -> None:

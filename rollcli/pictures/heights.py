@@ -64,18 +64,21 @@ class FittedRoad:
         In pixels of the map, from the centre of the top-left one.
     width, height : int
         Of the map, px.
+    ahead : float or None
+        Column that looks straight ahead, where camber is level, px; None: the map's middle.
     """
 
     model: RoadModel
     width: int
     height: int
+    ahead: float | None = None
 
     @classmethod
     def of_estimate(cls, estimate: RollEstimate) -> "FittedRoad":
         """Take the road of an estimate, with or without a pose."""
         # the angle of the pixels, which is not the rig's where fx and fy differ
         model = RoadModel(estimate.tangent.theta, estimate.alpha, estimate.camber or 0.0)
-        return cls(model, estimate.width, estimate.height)
+        return cls(model, estimate.width, estimate.height, estimate.tangent.grid.centre_u)
 
     @classmethod
     def of_row(cls, row: Row, calibration: Calibration | None) -> "FittedRoad | None":
@@ -89,12 +92,13 @@ class FittedRoad:
         theta = math.radians(row.map_roll_deg)
         if calibration is not None and row.pitch_deg is not None and row.image_roll_deg is None:
             theta = math.atan2(math.sin(theta) * calibration.fy / calibration.fx, math.cos(theta))
-        return cls(RoadModel(theta, row.alpha, row.camber or 0.0), row.width, row.height)
+        ahead = None if calibration is None or row.pitch_deg is None else calibration.cx
+        return cls(RoadModel(theta, row.alpha, row.camber or 0.0), row.width, row.height, ahead)
 
     @property
     def middle(self) -> tuple[float, float]:
-        """The map's middle, column and row."""
-        return (self.width - 1) / 2, (self.height - 1) / 2
+        """The middle column and row; the column is the one that looks straight ahead."""
+        return (self.width - 1) / 2 if self.ahead is None else self.ahead, (self.height - 1) / 2
 
     def across(self, columns: Coordinate, rows: Coordinate) -> Coordinate:
         """Return the place across the road of pixels, px from the map's middle."""

@@ -19,7 +19,7 @@ from rollcli.pictures.heights import CAMERA_HEIGHTS, METRES, FittedRoad, heights
 from rollcli.pictures.overlay import draw_disparity, draw_heights, draw_road_on_photo
 from rollcli.pictures.vdisparity import draw_v_disparity, row_offset, v_disparity
 from rollcli.report.sources import Subject
-from rollcli.rig.calibration import for_matched
+from rollcli.rig.calibration import Calibration, for_matched
 from rollcli.run.read import FRAME_ERRORS, Source, read_source
 
 # small enough that a page with a dozen frames opens at once, large enough to see a stripe of noise
@@ -104,13 +104,23 @@ def _source(subject: Subject) -> Source:
     return read_source(subject.frame, subject.options._replace(images=images))
 
 
+def _calibration(subject: Subject, disparity: NDArray[Any]) -> Calibration | None:
+    """Scale the frame's calibration to its map."""
+    if subject.frame.calibration is None:
+        return None
+    height, width = disparity.shape
+    downscale = subject.options.stereo.downscale if subject.frame.right_file else 1.0
+    return for_matched(subject.frame.calibration, width, height, downscale)
+
+
 def _road(subject: Subject, source: Source | None) -> NDArray[Any] | None:
     """Draw the road on the left image of a pair: as `estimate` wrote it, else found again."""
     if "road_mask" in subject.images:
         return read_image(subject.images["road_mask"])
     if source is None or source.photo is None:
         return None
-    request = subject.options.method.request()
+    calibration = _calibration(subject, source.disparity)
+    request = subject.options.method.request(middle=None if calibration is None else calibration.cx)
     found = estimate_roll(source.disparity, request, mask=source.allowed, road_mask=True)
     # where options that the record does not give back led to another angle, this is not its road
     if found.road_mask is None or abs(found.theta - subject.theta) > _SAME:
@@ -151,11 +161,8 @@ def _heights(subject: Subject, source: Source | None) -> NDArray[Any]:
     if "heights" in subject.images:
         written = read_stored(subject.images["heights"]).values.astype(np.float32)
         return draw_heights(written, span, unit, photo)
-    disparity, calibration = _required(None if source is None else source.shown), subject.frame.calibration
-    if calibration is not None:
-        height, width = disparity.shape
-        downscale = subject.options.stereo.downscale if subject.frame.right_file else 1.0
-        calibration = for_matched(calibration, width, height, downscale)
+    disparity = _required(None if source is None else source.shown)
+    calibration = _calibration(subject, disparity)
     road = FittedRoad.of_row(subject.row, calibration)
     if road is None:
         raise InputError(f"{subject.frame.file}: its row has no road")

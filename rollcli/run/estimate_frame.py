@@ -41,8 +41,8 @@ def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
 def _estimate(frame: Frame, options: FrameOptions, images: dict[str, bytes]) -> FrameResult:
     """Make the row, and last the images: a frame that fails has none."""
     source = read_source(frame, options)
-    estimate, likeness = _estimate_roll(source, options)
-    calibration = _calibration(frame, source, estimate)
+    calibration = _calibration(frame, source)
+    estimate, likeness = _estimate_roll(source, options, calibration)
     # the images are turned by the angle of the pixels, which is not the rig's where fx and fy differ
     made, note = encode_images(frame, Pictured(source, estimate, options, calibration))
     if calibration is not None:
@@ -52,9 +52,11 @@ def _estimate(frame: Frame, options: FrameOptions, images: dict[str, bytes]) -> 
     return FrameResult(row, source.encoding, {**source.warnings, likeness: likeness}, source.searched)
 
 
-def _estimate_roll(source: Source, options: FrameOptions) -> tuple[RollEstimate, str]:
+def _estimate_roll(
+    source: Source, options: FrameOptions, calibration: Calibration | None
+) -> tuple[RollEstimate, str]:
     """Estimate the roll; where there is no sure angle, say what the map looks like instead."""
-    request = options.method.request(source.slope_error)
+    request = options.method.request(source.slope_error, None if calibration is None else calibration.cx)
     wanted = options.images.road_mask is not None
     try:
         estimate = estimate_roll(source.disparity, request, mask=source.allowed, road_mask=wanted)
@@ -65,14 +67,15 @@ def _estimate_roll(source: Source, options: FrameOptions) -> tuple[RollEstimate,
     return estimate, looks_like(source.disparity, source.stored, options) if doubtful else ""
 
 
-def _calibration(frame: Frame, source: Source, estimate: RollEstimate) -> Calibration | None:
+def _calibration(frame: Frame, source: Source) -> Calibration | None:
     """Scale the frame's calibration from its images to its map."""
     if frame.calibration is None:
         return None
     calibration = frame.calibration
     if source.size is not None:
         calibration = calibration.for_size(*source.size)
-    return calibration.for_size(estimate.width, estimate.height)
+    height, width = source.disparity.shape
+    return calibration.for_size(width, height)
 
 
 def _row(frame: Frame, source: Source, estimate: RollEstimate, note: str, likeness: str) -> Row:

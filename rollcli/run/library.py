@@ -113,6 +113,8 @@ def estimate_roll(
     def said(reason: str) -> str:
         return "; ".join(filter(None, [_likeness(values, seed), reason]))
 
+    if rig is not None and values.ndim == 2:
+        request = replace(request, middle=rig.for_size(*values.shape[::-1]).cx)
     try:
         estimate = estimator.estimate_roll(values, request, mask=mask, road_mask=road_mask)
     except EstimationError as error:
@@ -191,9 +193,11 @@ def estimate_pair(
     if allowed is not None and not (allowed.ndim == 2 and allowed.any()):
         raise UsageError("the mask leaves no pixel of the map: give an array that is not all zero")
     source = matched_source(left, right, stereo or StereoOptions(), wanted_of(allowed, request))
-    request = replace(request, slope_error=source.slope_error)
-    height, width = left.shape[:2]
+    if rig is not None:
+        rig = rig.for_size(*left.shape[1::-1]).for_size(*source.disparity.shape[::-1])
+    middle = None if rig is None else rig.cx
+    request = replace(request, slope_error=source.slope_error, middle=middle)
     estimate = estimator.estimate_roll(source.disparity, request, mask=allowed, road_mask=road_mask)
     message = "; ".join(filter(None, [estimate.message, source.doubt, source.note]))
     estimate = replace(estimate, status="suspect" if source.doubt else estimate.status, message=message)
-    return estimate if rig is None else with_pose(estimate, rig.for_size(width, height))
+    return estimate if rig is None else with_pose(estimate, rig)

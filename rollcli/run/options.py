@@ -215,13 +215,13 @@ class MethodOptions(NamedTuple):
     max_interval_deg: float = MAX_INTERVAL_DEG
     seed: int = 0
 
-    def request(self, slope_error: float = 0.0) -> Request:
-        """Return what is asked of the estimator, in radians; `slope_error`: of the map, px per px."""
+    def request(self, slope_error: float = 0.0, middle: float | None = None) -> Request:
+        """Return what is asked of the estimator, in radians; the others are of the map: see `Request`."""
         given: dict[str, Any] = {
             name.removesuffix("_deg"): math.radians(value) if name.endswith("_deg") else value
             for name, value in self._asdict().items()
         }
-        return Request(**given, slope_error=slope_error)
+        return Request(**given, slope_error=slope_error, middle=middle)
 
 
 class ImageOptions(NamedTuple):

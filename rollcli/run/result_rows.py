@@ -86,8 +86,10 @@ def _is_copy(frame: Frame, row: Row, options: FrameOptions) -> bool:
         found = estimate_roll(source.disparity, options.method.request(), mask=source.allowed)
     except (OSError, RollcliError):
         return False
-    # of a pair the row is of the road matched along its plane, the map of all that was matched
-    most = max(_SAME_DEG, row.roll_ci95_deg or 0.0) if row.right_file else _SAME_DEG
+    # of a pair the row is of the road matched along its plane, the map of all that was matched; with a
+    # calibration the row is of the lane below the principal point
+    other = row.right_file or row.pitch_deg is not None
+    most = max(_SAME_DEG, row.roll_ci95_deg or 0.0) if other else _SAME_DEG
     return abs(math.degrees(found.theta) - (row.map_roll_deg or 0.0)) < most
 
 

@@ -11,6 +11,7 @@ from rollcli.simulate.build import render_frame
 from rollcli.simulate.dataset import calibration
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import draw_specs
+from tests.estimator.synthetic_maps import banked_road
 from tests.rig import calibration_files as samples
 from tests.rig.calibration_files import Rig
 from tests.rig.test_pose import cast
@@ -47,6 +48,23 @@ def test_every_method_fills_the_columns(maps, method, road):
     assert_posed(rows_of(done.out))
     assert all(row["message"] == "" for row in rows_of(done.out))
     assert done.err.count("px of cy") == 1  # what holds for all frames is said once
+
+
+def test_of_a_cropped_map_the_lane_is_the_one_below_the_principal_point(tmp_path):
+    write_kitti(tmp_path / "map.png", banked_road(2, cropped=200))
+    given = ("--focal", "360", "--principal-point", "110,94", "--baseline", "0.5")
+    images = ("--heights", "heights")
+    done = rollcli("estimate", "map.png", *given, *images, "-o", "rolls.csv", cwd=tmp_path)
+    assert done.status == 0
+    (row,) = rows_of((tmp_path / "rolls.csv").read_text())
+    assert (row["status"], float(row["roll_deg"])) == ("ok", pytest.approx(2, abs=0.02))
+
+    again = rollcli("heights", "map.png", "--from", "rolls.csv", *given, "-o", "again", cwd=tmp_path)
+    assert again.status == 0, again.err
+    both = [cv2.imread(str(next((tmp_path / each).rglob("*.tif*"))), -1) for each in ("heights", "again")]
+    assert np.nanmax(np.abs(both[0] - both[1])) < 1e-3
+    lane = both[0][120:, 90:130]
+    assert abs(np.nanmedian(lane)) < 0.005
 
 
 @pytest.mark.slow

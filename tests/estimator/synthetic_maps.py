@@ -40,6 +40,16 @@ def bent_road(roll_deg, *, width=160, height=120, bend=0.002, noise=0.0, seed=0)
     return 80 + 0.3 * y + bend * y * y + rng.normal(0, noise, y.shape)
 
 
+def banked_road(roll_deg, *, cropped=0, middle=310):
+    """A level lane, noise, and ground that rises to its right; so many columns on the left are cropped."""
+    roll, slope = math.radians(roll_deg), 0.33
+    v, u = np.mgrid[:190, :620] - np.array([94, middle])[:, None, None]
+    road = 5 + slope * (v * math.cos(roll) - u * math.sin(roll))
+    side = slope * (u * math.cos(roll) + v * math.sin(roll)) / np.maximum(road, 1)
+    noisy = road / (1 - 0.06 * np.clip(side - 1.3, 0, 8)) + np.random.default_rng(0).normal(0, 0.1, v.shape)
+    return np.where(road > 1, noisy, 0)[:, cropped:]
+
+
 @st.composite
 def random_maps(draw):
     """Noise, whole pixels, roads at any roll, few pixels, strips: of any small size."""

@@ -87,7 +87,7 @@ def select_pixels(checked: CheckedMap, request: Request) -> PixelSet:
     tuning, values, usable = request.tuning, checked.values, checked.usable
     road, surface = None, None
     if request.road == "auto":
-        sample = take_sample(values, usable, tuning.sample)
+        sample = take_sample(values, usable, tuning.sample, request.middle)
         road = find_road(sample, request.max_roll, request.seed, tuning)
         surface = fit_surface(sample, road, parabolic=request.parabolic, tuning=tuning)
     if request.method in AREAS:

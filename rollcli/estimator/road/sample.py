@@ -105,7 +105,12 @@ class Sample:
     spacing: Spacing
 
 
-def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None, tuning: SampleTuning) -> Sample:
+def take_sample(
+    disparity: NDArray[Any],
+    usable: NDArray[np.bool_] | None,
+    tuning: SampleTuning,
+    middle: float | None = None,
+) -> Sample:
     """Sample a map.
 
     Parameters
@@ -115,6 +120,8 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None, tunin
     usable : ndarray of bool, shape (H, W), or None
         Pixels that may be taken; neighbours outside still count as neighbours.
     tuning : SampleTuning
+    middle : float, optional
+        See `Request`.
 
     Returns
     -------
@@ -127,9 +134,9 @@ def take_sample(disparity: NDArray[Any], usable: NDArray[np.bool_] | None, tunin
     """
     disparity = np.ascontiguousarray(disparity)
     height, width = disparity.shape
-    grid, reach = Grid.of_shape(height, width), reach_of(height, width, tuning)
+    grid, reach = Grid.of_shape(height, width, middle), reach_of(height, width, tuning)
     spacing, chosen = _chosen(disparity, usable, reach, tuning)
-    at, right, down, columns = _lattice(height, width, reach, spacing)
+    at, right, down, columns = _lattice(grid, height, width, reach, spacing)
     places, column = at.take(chosen, mode="clip"), columns.take(chosen, mode="clip")
     x, y = right.take(chosen, mode="clip"), down.take(chosen, mode="clip")
     d = values_at(places, disparity)
@@ -194,12 +201,12 @@ def _chosen(
 
 @lru_cache(maxsize=4)
 def _lattice(
-    height: int, width: int, reach: int, spacing: Spacing
+    grid: Grid, height: int, width: int, reach: int, spacing: Spacing
 ) -> tuple[NDArray[np.intp], Singles, Singles, NDArray[np.uint16]]:
     """Return the places in the map, x, y and the column in the lattice of all pixels so far apart."""
     top, left = spacing.first(reach)
     v, u = np.arange(top, height - reach, spacing.rows), np.arange(left, width - reach, spacing.columns)
-    x, y = (each.astype(np.float32) for each in Grid.of_shape(height, width).normalised(u, v))
+    x, y = (each.astype(np.float32) for each in grid.normalised(u, v))
     shape = (len(v), len(u))
     return (
         (v[:, None] * width + u).ravel(),

@@ -18,7 +18,7 @@ from rollcli.simulate.build import render_frame
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
 from rollcli.stereo.match import StereoOptions, match_pair
-from tests.estimator.synthetic_maps import bent_road, flat_road
+from tests.estimator.synthetic_maps import banked_road, bent_road, flat_road
 from tests.true_disparity import true_disparity
 
 STREETS = Path(__file__).parents[3].parent / "shared" / "streets"
@@ -341,6 +341,14 @@ def test_a_road_without_road_finding_is_beyond_doubt(model):
 
     assert (found.status, found.message) == ("ok", "")
     assert found.road_fraction == 1
+
+
+@pytest.mark.parametrize("cropped", [0, 100, 200, 250])
+def test_the_lane_ahead_is_the_one_below_the_given_column(cropped):
+    estimate = estimate_roll(banked_road(2, cropped=cropped), Request(middle=310.0 - cropped))
+
+    assert estimate.status == "ok"
+    assert abs(estimate.roll_deg - 2) < 0.02
 
 
 def test_a_map_whose_pixels_have_no_neighbours_is_said_to_be_sparse():

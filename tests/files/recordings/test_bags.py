@@ -71,7 +71,7 @@ def test_disparity_images_give_the_rows_of_the_same_maps_in_files(tmp_path, kind
     for name in made:
         upright, again = (np.load(tmp_path / folder / name) for folder in ("upright", "again"))
         np.testing.assert_allclose(upright, again, rtol=1e-5)  # a result rounds its angles
-    one = rollcli("estimate", found[1]["file"], cwd=tmp_path)
+    one = rollcli("estimate", found[1]["file"], *numbers, cwd=tmp_path)
     assert rows(one.out)[0]["roll_deg"] == found[1]["roll_deg"]
     every = rollcli("estimate", path, "--every", "2", cwd=tmp_path)
     assert rows(every.out) == [found[0], found[2]]
