@@ -72,11 +72,12 @@ def as_bright(views: Views) -> Views:
     Those that are black or white in one of the views tell nothing: they may have been clipped. Nor does the
     border of either view, which the other may not have.
     """
-    shown = np.ones(views[0].shape, np.bool_)
+    few = [each[::_EVERY, ::_EVERY] for each in views]
+    shown = np.ones(few[0].shape, np.bool_)
     for each in views:
         if (border := black_border(each)) is not None:
-            shown &= ~border
-    levels = [np.sort(each[::_EVERY, ::_EVERY][shown[::_EVERY, ::_EVERY]]) for each in views]
+            shown &= ~border[::_EVERY, ::_EVERY]
+    levels = [np.sort(each[shown], kind="stable") for each in few]  # of bytes a radix sort: a fifth of the time
     if not levels[0].size:
         return views
     places = (_QUANTILES * levels[0].size).astype(np.intp)
