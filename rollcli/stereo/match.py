@@ -28,7 +28,7 @@ from rollcli.stereo.misalignment import LEVEL, NOTHING_KNOWN, ColumnSupport, Mis
 from rollcli.stereo.options import StereoOptions as StereoOptions
 from rollcli.stereo.refinement import refined
 from rollcli.stereo.sgbm import NARROWEST, usable_range
-from rollcli.stereo.views import Map, as_bright, black_border, prepare_views, shrink
+from rollcli.stereo.views import Map, as_bright, prepare_views, shows_nothing, shrink
 
 # Shares of the textured blocks that tell
 _SURE = 0.3  # from here on the images are what they should be
@@ -274,7 +274,7 @@ def match_pair(
         count = (width // 8 if look.range is None else look.range) - first
     count = usable_range(count, first, width, options.block_size)
 
-    search, blank = Search(first, count, options), black_border(views[0])
+    search, blank = Search(first, count, options), shows_nothing(views[0])
 
     @lru_cache(maxsize=1)
     def levelled(lies: Misalignment) -> Levelled:

@@ -7,10 +7,10 @@ import pytest
 from rollcli.errors import InputError
 from rollcli.stereo.views import (
     as_bright,
-    black_border,
     matched_shape,
     prepare_views,
     sampled,
+    shows_nothing,
     shrink,
     shrink_both,
     smoothed_at_pixels,
@@ -176,29 +176,26 @@ def test_views_that_are_about_as_bright_stay_as_they_are():
     assert all(a is b for a, b in zip(as_bright(views), views, strict=True))
 
 
-def test_black_that_reaches_the_edge_is_the_border():
-    view = np.random.default_rng(0).integers(60, 200, (60, 80), dtype=np.uint8)
-    view[20:30, 30:40] = 0
-    assert black_border(view) is None
-    view[-10:] = 0
-    view[:, :3] = 0
-    border = black_border(view)
-    assert border is not None
-    assert border[-10:].all()
-    assert border[:, :3].all()
-    assert border.sum() == 10 * 80 + 3 * 50
+@pytest.mark.parametrize("level", [0, 255])
+def test_patches_that_were_clipped_show_nothing_and_single_pixels_do(level):
+    view = np.random.default_rng(0).integers(1, 255, (60, 80), dtype=np.uint8)
+    assert shows_nothing(view) is None
+    view[::5, ::4] = level
+    assert shows_nothing(view) is None
+    view[20:30, 30:40] = level
+    nothing = shows_nothing(view)
+    assert nothing is not None
+    assert nothing[19:31, 29:41].all()
+    assert nothing.sum() <= 14 * 14  # single pixels beside the patch widen it
 
 
-def test_a_dark_edge_of_one_level_is_the_border_and_a_white_sky_is_not():
+def test_a_dark_edge_of_one_level_shows_nothing():
     view = np.random.default_rng(0).integers(20, 250, (60, 80), dtype=np.uint8)
-    assert black_border(view) is None
-    view[:15] = 255
-    assert black_border(view) is None
     view[-10:] = 16
-    border = black_border(view)
-    assert border is not None
-    assert border[-10:].all()
-    assert border.sum() == 10 * 80
+    nothing = shows_nothing(view)
+    assert nothing is not None
+    assert nothing[-11:].all()
+    assert nothing.sum() == 11 * 80
 
 
 def test_a_defect_pixel_of_16_bits_makes_no_view_dark():
