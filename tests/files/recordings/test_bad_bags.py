@@ -12,8 +12,6 @@ from tests.files.recordings.small_bags import mcap
 from tests.files.recordings.test_bags import START, STEP, P, drive, maps, rows
 from tests.run_cli import rollcli, write_pair
 
-NO_P = [0.0] * 12
-
 
 @pytest.fixture
 def views(tmp_path):

@@ -16,11 +16,9 @@ from rollcli import __version__
 from rollcli.errors import UsageError
 from rollcli.files.storage import list_names, read_bytes
 from rollcli.run.workers import cluster
-from rollcli.run.workers.chunks import Work
 from rollcli.run.workers.cluster import check_scheduler, probe, scheduler_address
 from tests.in_process import run_here
 from tests.object_store import joined, upload
-from tests.run.workers.tasks import lost, run
 from tests.run_cli import (
     contents,
     environment,
@@ -310,10 +308,9 @@ def test_what_is_no_address_is_refused_and_the_result_that_is_there_is_kept(tmp_
 def test_a_scheduler_without_workers_ends_the_run(tmp_path, monkeypatch):
     monkeypatch.setattr(cluster, "_FIRST_WORKER_S", 0.5)
     write_maps(tmp_path / "maps", 2)
-    here = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": ":0"}
     from distributed import LocalCluster
 
-    with LocalCluster(n_workers=0, processes=False, **here) as empty:
+    with LocalCluster(n_workers=0, processes=False, **HERE) as empty:
         done = estimate_here(empty.scheduler_address, tmp_path)
     assert done.status == 1
     assert f"{empty.scheduler_address}: has no workers" in done.err
@@ -343,7 +340,6 @@ def test_workers_that_share_only_a_bucket_give_the_bytes_of_a_local_run(
     assert images == contents(local / "upright")
 
 
-WORK = Work(run, lost)
 HERE = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": ":0", "threads_per_worker": 1}
 
 
