@@ -16,18 +16,8 @@ pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
 pytest.importorskip("jinja2", reason="jinja2, of the extra report, is not here")
 
 NAME = "maps/<script>alert(1)</script>.png"
-# where on the screen the chart has the mark of a frame
-PLACE = """name => {
-    const chart = document.getElementById("roll");
-    const box = chart.querySelector(".nsewdrag").getBoundingClientRect();
-    const escaped = new Option(name).innerHTML;
-    for (const trace of chart._fullData) {
-        const place = (trace.customdata ?? []).findIndex(each => each?.startsWith(escaped + "<br>"));
-        const axis = trace.yaxis === "y2" ? "yaxis2" : "yaxis";
-        if (place >= 0) return [box.x + chart._fullLayout.xaxis.d2p(trace.x[place]),
-                                box.y + chart._fullLayout[axis].d2p(trace.y[place])];
-    }
-}"""
+# what is asked of the page, by its name
+IN_PAGE = {path.stem: path.read_text("utf-8") for path in Path(__file__).with_name("in_page").iterdir()}
 NEVER_IDLE = "window.requestIdleCallback = () => {}"  # charts wait until the browser is idle
 
 
@@ -115,7 +105,7 @@ def test_a_result_of_one_kind_of_frame_has_a_page_without_complaint(opened, tmp_
 def test_hovering_shows_the_name_of_the_frame_as_text(seen):
     page = seen()
     for name in ("maps/frame3.png", "maps/frame5.png", NAME):
-        x, y = page.evaluate(PLACE, name)
+        x, y = page.evaluate(IN_PAGE["place"], name)
         page.mouse.move(x + 1, y + 1)
         label = page.locator("#roll .hovertext", has_text=name)
         label.wait_for()
@@ -215,18 +205,8 @@ def test_on_a_narrow_screen_a_wide_map_is_enlarged_beyond_the_screen_and_is_move
 def test_nothing_is_cut_off_or_too_small_to_read(seen, width):
     page = seen(width=width)
     assert page.evaluate("document.documentElement.scrollWidth") == width
-    too_wide = page.evaluate(
-        """() => [...document.querySelectorAll("main *")].filter(
-            each => each.getBoundingClientRect().right > innerWidth + 1 && !each.closest(".wide, .chart")
-        ).map(each => each.outerHTML.slice(0, 80))"""
-    )
-    assert too_wide == []
-    sizes = page.evaluate(
-        """() => [...document.querySelectorAll("main *")].filter(
-            each => [...each.childNodes].some(node => node.nodeType === 3 && node.data.trim())
-                && !each.closest("dialog, script") && each.getClientRects().length
-        ).map(each => [parseFloat(getComputedStyle(each).fontSize), each.outerHTML.slice(0, 80)])"""
-    )
+    assert page.evaluate(IN_PAGE["too_wide"]) == []
+    sizes = page.evaluate(IN_PAGE["font_sizes"])
     assert min(sizes)[0] >= 11, min(sizes)
 
 
@@ -237,30 +217,6 @@ def test_on_a_narrow_screen_no_value_is_hidden(seen):
         "all => all.filter(e => e.textContent && !e.getClientRects().length).map(e => e.className)"
     )
     assert hidden == []
-
-
-# puts pages beside each other as columns, which a browser fills by the rules of pages
-COLUMNS = """() => {
-    const size = "width: 720px; height: 1040px; max-width: none; margin: 0; padding: 0";
-    document.querySelector("main").style.cssText = `${size}; columns: 720px; column-fill: auto`;
-}"""
-# headings in another column than what follows them, and parts that reach beyond their column
-TORN = """() => {
-    const main = document.querySelector("main"), gap = parseFloat(getComputedStyle(main).columnGap) || 16;
-    const first = each => each.getClientRects()[0];
-    const column = each => Math.floor(first(each).left / (720 + gap));
-    const seen = each => each.getClientRects().length;
-    const headings = [...document.querySelectorAll("h2, h3")].filter(seen);
-    const torn = headings.filter(each => {
-        let next = each.nextElementSibling;
-        while (next && !seen(next)) next = next.nextElementSibling;
-        return next && column(next) !== column(each);
-    });
-    const reaches = (box, each) => box.right > (column(each) + 1) * (720 + gap) || box.bottom > 1041;
-    const cut = [...document.querySelectorAll("td, th, .picture, .chart")].filter(seen).filter(
-        each => [...each.getClientRects()].some(box => reaches(box, each)));
-    return [...torn, ...cut].map(each => each.outerHTML.slice(0, 80));
-}"""
 
 
 def test_a_printed_page_shows_both_sides_of_the_switch_and_keeps_headings_with_what_follows(opened, tmp_path):
@@ -280,9 +236,9 @@ def test_a_printed_page_shows_both_sides_of_the_switch_and_keeps_headings_with_w
     assert rollcli("report", "rolls.csv", "-o", "page.html", "--gallery", "0", cwd=tmp_path).status == 0
     for each in (page, opened(url=(tmp_path / "page.html").as_uri())):
         each.emulate_media(media="print")
-        each.evaluate(COLUMNS)
+        each.evaluate(IN_PAGE["columns"])
         assert each.evaluate("document.querySelector('main').scrollWidth") > 1500  # several pages
-        assert each.evaluate(TORN) == []
+        assert each.evaluate(IN_PAGE["torn"]) == []
 
 
 def test_a_hundred_and_twenty_frames_are_a_sheet_of_answer_and_six_of_pictures(opened, tmp_path):
@@ -407,7 +363,7 @@ def test_a_click_on_a_point_of_the_chart_leads_to_its_row_and_pictures(opened):
     page = opened()
     for name in ("maps/frame3.png", "maps/frame5.png"):
         page.locator("#roll").scroll_into_view_if_needed()
-        x, y = page.evaluate(PLACE, name)
+        x, y = page.evaluate(IN_PAGE["place"], name)
         page.mouse.move(x + 1, y + 1)
         page.locator("#roll .hovertext", has_text=name).wait_for()
         page.mouse.click(x + 1, y + 1)
