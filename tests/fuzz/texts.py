@@ -36,37 +36,8 @@ READ_BY = {
     "bags": ("estimate", "-j1", "text.{}"),  # by its ending
     "urls": (),  # by no command: one would ask the servers that they name
 }
-_SETTINGS = """\
-quiet = true
-jobs = 1
-[estimate]
-encoding = "kitti"
-scale = 0.00390625
-invalid = [255.0, 1]
-roi = "0,0,160,120"
-polygon = "0,0 159,0 159,119 0,119"
-include = ["*.png", "**/frame?.png"]
-method = "gss"
-max-roll = 30.0
-timing = true
-[evaluate.accuracy]
-format = "json"
-"""
+_SAMPLES = {path.stem: path.read_text("utf-8") for path in Path(__file__).with_name("samples").iterdir()}
 _LIST = "".join(f"maps/frame{index}.png\n" for index in range(3))
-_URLS = """\
-http://user:secret@host:8080/drive%201/..%5Cframe.png?X-Amz-Signature=secret#part
-https://host/%2e%2e/a%00.png
-HTTP://host/
-s3://bucket/drive/2024.05.01/C:\\frame 1.png
-gs://bucket/../key
-az://keys@container/key
-ftp://host/frame.png
-"""
-_TRUTH = """\
-file,roll_deg,pitch_deg,height_m,curvature_per_m
-frame0.png,0.0,1.5,1.4,0
-frame1.png,0.57,,,0.001
-"""
 _RIG = Rig(fx=140.5, fy=140.5, cx=79.2, cy=58.9, width=160, height=120)
 # 3: `evaluate` has no angle for a name; 4: `rig` has too few rows to tell
 _ENDED = {0: "read", 3: "read", 4: "read", 2: "refused"}
@@ -94,14 +65,14 @@ def _whole() -> dict[str, bytes]:
         "records/json": (folder / RECORD).read_bytes(),
         "inputs/txt": (folder / INPUTS).read_bytes(),
         **(_bags(folder) if find_spec("rosbags") else {}),  # the extra
-        "settings/toml": _SETTINGS.encode(),
-        "truths/csv": _TRUTH.encode(),
+        "settings/toml": _SAMPLES["settings"].encode(),
+        "truths/csv": _SAMPLES["truth"].encode(),
         "lists/txt": _LIST.encode(),
         "lists/print0": _LIST.replace("\n", "\0").encode(),
         "lists/utf-16": _LIST.replace("\n", "\r\n").encode("utf-16"),
         "results/utf-16": rolls.decode().encode("utf-16"),
-        "settings/utf-16": _SETTINGS.encode("utf-16"),
-        "urls/txt": _URLS.encode(),
+        "settings/utf-16": _SAMPLES["settings"].encode("utf-16"),
+        "urls/txt": _SAMPLES["urls"].encode(),
         "calibrations/unrectified-kalibr": KALIBR.encode(),
         "calibrations/unrectified-zed": zed(_RIG).encode(),
         **{f"calibrations/{form}": write(_RIG).encode() for form, write in WHOLE.items()},
