@@ -8,6 +8,7 @@ shows columns of a CSV. A heading ends with the package that its session needs, 
 left out, and numbers may differ in their last digit.
 """
 
+import contextlib
 import csv
 import io
 import json
@@ -15,6 +16,7 @@ import os
 import re
 import shlex
 import shutil
+import sqlite3
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,6 +32,7 @@ from tests.run_cli import contents, keep_rows, road_map, rollcli, write_kitti, w
 _NUMBER = re.compile(r"(?<![\w.])[-+−]?\d+\.(\d+)(?:e([-+]\d+))?(?![\w.])")
 _TIMES = re.compile(r"[\d.]+ (?=s\b|frames/s|MB)")
 _CAMERA = "P{}: 100 0 79.5 {} 0 100 59.5 0 0 0 1 0\n"
+_PACKED = (".parquet", ".bag", ".db3", ".mcap", ".zip", ".tar")
 _SHARE = 2e-4  # of a number, that versions of NumPy and OpenCV may differ by
 
 
@@ -143,7 +146,7 @@ def _changes(before, after):
 
 def _described(name, data):
     """Of a map its numbers, of a picture its size, of a text how many lines it has."""
-    if name.endswith((".svg", ".pdf", ".html", ".parquet", ".bag", ".db3", ".mcap", ".yaml")):
+    if name.endswith((*_PACKED, ".svg", ".pdf", ".html", ".yaml")):
         return "a file"
     if not name.endswith((".png", ".tif", ".npy")):
         return f"{data.count(10)} lines"
@@ -195,6 +198,29 @@ def _map(folder, name, roll="0.1", times="1"):
     (folder / name).parent.mkdir(parents=True, exist_ok=True)
     disparity = road_map(float(roll), seed=9) * float(times)
     np.save(folder / name, disparity) if name.endswith(".npy") else write_kitti(folder / name, disparity)
+
+
+def _pack(folder, name, packed):
+    """Pack a folder as ZIP or tar, by the ending."""
+    stem, _, form = name.rpartition(".")
+    shutil.make_archive(str(folder / stem), form, folder / packed)
+
+
+def _pair(folder, name, roll, width, nearer="0"):
+    """Write PLACE/left/NAME and PLACE/right/NAME: a road, all of it so many pixels of disparity nearer."""
+    place, _, view = name.rpartition("/")
+    write_pair(folder / place, view, road_map(float(roll), width=int(width)) / 2 + float(nearer))
+
+
+def _same(folder, one, other):
+    """Tell whether the bytes of two files are the same."""
+    return ["yes" if (folder / one).read_bytes() == (folder / other).read_bytes() else "no"]
+
+
+def _sql(folder, name, statement):
+    """Change a bag of SQLite."""
+    with contextlib.closing(sqlite3.connect(folder / name)) as base, base:
+        base.execute(statement)
 
 
 def _rows(folder, name, count, further="0"):
@@ -286,9 +312,13 @@ _TOOLS = {
     "edit": _edit,
     "link": _link,
     "map": _map,
+    "pack": _pack,
+    "pair": _pair,
     "rm": _remove,
     "rows": _rows,
+    "same": _same,
     "show": _show,
+    "sql": _sql,
     "write": _write,
     "rig": _rig,
 }

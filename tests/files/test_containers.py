@@ -1,6 +1,7 @@
 """Archives are read as folders; what is in them can neither fill memory nor name a file elsewhere."""
 
 import math
+import shutil
 import tarfile
 import zipfile
 
@@ -10,85 +11,18 @@ from rollcli.errors import InputError, UsageError
 from rollcli.files.containers import file_of, shown
 from rollcli.files.search import Search
 from rollcli.files.storage import read_bytes
-from tests.run_cli import (
-    command,
-    contents,
-    ended,
-    keep_rows,
-    road_map,
-    rollcli,
-    rows_of,
-    write_kitti,
-    write_maps,
-    write_pair,
-)
-
-
-def packed(folder, archive):
-    """Pack the files of a folder."""
-    if archive.suffix == ".tar":
-        with tarfile.open(archive, "w") as file:
-            file.add(folder, ".")
-    else:
-        with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
-            for path in sorted(folder.rglob("*.*")):
-                file.write(path, path.relative_to(folder).as_posix())
-    return archive
-
-
-@pytest.mark.parametrize("name", ["run.zip", "run.tar"])
-def test_an_archive_gives_the_rows_of_its_folder(tmp_path, name):
-    write_maps(tmp_path / "all" / "maps", 3)
-    packed(tmp_path / "all", tmp_path / name)
-    whole = rows_of(rollcli("estimate", "all/maps", cwd=tmp_path).out)
-    done = rollcli("estimate", name, "-j", "2", "--derotated", "upright", cwd=tmp_path)
-    found = rows_of(done.out)
-    assert [row["file"] for row in found] == [f"{name}#maps/frame{each}.png" for each in range(3)]
-    assert [row["roll_deg"] for row in found] == [row["roll_deg"] for row in whole]
-    assert sorted(path.name for path in (tmp_path / "upright/maps").iterdir()) == [
-        f"frame{each}.png" for each in range(3)
-    ]
-    listed = rollcli("estimate", name, "--dry-run", cwd=tmp_path).out.splitlines()
-    assert listed[0] == f"read  {name}#maps/frame0.png"
-    again = rollcli("estimate", f"{name}#maps/frame1.png", cwd=tmp_path)
-    assert rows_of(again.out)[0]["roll_deg"] == whole[1]["roll_deg"]
+from tests.run_cli import command, contents, ended, road_map, rollcli, rows_of, write_kitti, write_maps
 
 
 def test_workers_that_were_forked_from_one_process_read_an_archive_each_for_itself(tmp_path):
     for number in range(24):
         write_kitti(tmp_path / "all" / f"{number}.png", road_map(width=640, height=480, seed=number))
-    packed(tmp_path / "all", tmp_path / "run.zip")
+    shutil.make_archive(str(tmp_path / "run"), "zip", tmp_path / "all")
     line = ("derotate", "run.zip", "--roll", "2", "-q")
     assert rollcli(*line, "-j", "1", "-o", "one", cwd=tmp_path).status == 0
     done = rollcli(*line, "-j", "6", "-o", "six", cwd=tmp_path)
     assert (done.status, done.err) == (0, "")
     assert contents(tmp_path / "six") == contents(tmp_path / "one")
-
-
-def test_a_run_over_an_archive_is_resumed_until_the_archive_changes(tmp_path):
-    write_maps(tmp_path / "maps", 3)
-    packed(tmp_path / "maps", tmp_path / "run.tar")
-    rollcli("estimate", "run.tar", "-o", "rolls.csv", cwd=tmp_path)
-    whole = keep_rows(tmp_path / "rolls.csv", 1)
-    assert rollcli("estimate", "run.tar", "-o", "rolls.csv", "--resume", cwd=tmp_path).status == 0
-    assert (tmp_path / "rolls.csv").read_bytes() == whole
-    packed(tmp_path, tmp_path / "run.tar")
-    assert rollcli("estimate", "run.tar", "-o", "rolls.csv", "--resume", cwd=tmp_path).status == 2
-
-
-def test_the_views_of_a_shard_pair_up_and_are_never_taken_for_maps(tmp_path):
-    write_pair(tmp_path / "pairs", "000001.png", road_map())
-    left, right = sorted((tmp_path / "pairs").rglob("*.png"))
-    with tarfile.open(tmp_path / "shard.tar", "w") as file:
-        file.add(left, "000001.left.png")
-        file.add(right, "000001.right.png")
-        file.add(left, "000002.left.png")
-        file.add(right, "000002.right.png")
-    pairs = rollcli("estimate", "--left", "shard.tar", "--right", "shard.tar", cwd=tmp_path)
-    assert [(row["file"], row["right_file"]) for row in rows_of(pairs.out)] == [
-        (f"shard.tar#00000{each}.left.png", f"shard.tar#00000{each}.right.png") for each in (1, 2)
-    ]
-    assert "--left shard.tar --right shard.tar" in rollcli("estimate", "shard.tar", cwd=tmp_path).refused()
 
 
 def test_a_member_cannot_name_a_file_elsewhere(tmp_path):

@@ -7,7 +7,7 @@ import pytest
 from rollcli.files import inputs as manifests
 from rollcli.files.inputs import Manifest
 from rollcli.files.naming import natural_key
-from tests.run_cli import keep_rows, python, rollcli, write_maps
+from tests.run_cli import python
 
 
 @pytest.fixture
@@ -44,27 +44,6 @@ def test_a_byte_order_mark_is_one_at_the_start_of_the_file_alone(tmp_path):
     path = tmp_path / "names.txt"
     path.write_text("\ufeffa.png\nb.png\n\ufeffc.png\n", "utf-8")
     assert list(Manifest(path).names(range(3))) == ["a.png", "b.png", "\ufeffc.png"]
-
-
-@pytest.fixture
-def maps(tmp_path):
-    write_maps(tmp_path / "maps", 12)
-    (tmp_path / "maps" / "frame3.png").unlink()
-    (tmp_path / "list.txt").write_text("".join(f"maps/frame{i}.png\n" for i in range(12)))
-    return tmp_path
-
-
-def test_a_sorted_list_gives_the_bytes_of_one_that_is_read_at_once_also_after_a_resume(maps):
-    line = ("estimate", "--files-from", "list.txt", "-q")
-    assert rollcli(*line, "-o", "whole.csv", cwd=maps).status == 3
-    assert rollcli(*line, "--sorted", "-o", "rolls.csv", "-j", "2", cwd=maps).status == 3
-    whole = (maps / "whole.csv").read_bytes()
-    assert (maps / "rolls.csv").read_bytes() == whole
-    records = [(maps / f"{name}.csv.run.json").read_bytes() for name in ("rolls", "whole")]
-    assert records[0] == records[1]
-    keep_rows(maps / "rolls.csv", 5)
-    assert rollcli(*line, "--sorted", "-o", "rolls.csv", "--resume", cwd=maps).status == 3
-    assert (maps / "rolls.csv").read_bytes() == whole
 
 
 # a program that says how much memory it has taken, kB

@@ -7,7 +7,7 @@ import pytest
 
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_stored
-from tests.run_cli import ROOT, contents, road_map, rollcli, write_pair
+from tests.run_cli import ROOT, contents, rollcli
 
 ROADS = ROOT.parent / "shared" / "roads"
 
@@ -36,37 +36,6 @@ def test_each_pair_gives_a_kitti_map_named_after_its_left_image(pairs):
         both = (found > 0) & (truth > 0)
         assert both.sum() > 0.6 * (truth > 0).sum()  # the left margin has no partner in the right image
         assert np.median(np.abs(found - truth)[both]) < 0.5
-
-
-@pytest.mark.parametrize("program", [["disparity", "-o"], ["estimate", "-o", "rolls.csv", "--disparity"]])
-def test_a_map_that_a_16_bit_png_cannot_hold_is_written_as_tiff_and_that_is_said(tmp_path, program):
-    for name, near in (("a.png", 0), ("b.png", 280), ("c.png", 0)):
-        write_pair(tmp_path, name, road_map(0.02, width=900) / 2 + near)
-    line = [*program, "maps", "--left", "left", "--right", "right", "--num-disparities", "352"]
-    done = rollcli(*line, cwd=tmp_path)
-    assert done.status == 0
-    said = done.err + (tmp_path / "rolls.csv").read_text() if program[0] == "estimate" else done.err
-    words = "written as TIFF: a disparity is above the 256 px of a KITTI PNG"
-    lines = [line for line in said.splitlines() if words in line]
-    assert lines
-    assert all("left/b.png" in line for line in lines)
-    assert sorted(contents(tmp_path / "maps")) == ["a.png", "b.tif", "c.png"]
-    assert read_disparity(tmp_path / "maps" / "b.tif").max() > 300
-    (tmp_path / "maps" / "b.png").write_bytes(b"of an earlier run")
-    assert rollcli(*line, "--overwrite", cwd=tmp_path).status == 0
-    assert sorted(contents(tmp_path / "maps")) == ["a.png", "b.tif", "c.png"]
-
-
-def test_a_resume_finds_the_tiff_that_stands_for_a_png(tmp_path):
-    for name, near in (("a.png", 0), ("b.png", 280)):
-        write_pair(tmp_path, name, road_map(0.02, width=900) / 2 + near)
-    line = ["estimate", "--left", "left", "--right", "right", "--num-disparities", "352", "-o", "rolls.csv"]
-    line += ["--disparity", "maps"]
-    assert rollcli(*line, cwd=tmp_path).status == 0
-    assert "made again" not in rollcli(*line, "--resume", cwd=tmp_path).err
-    (tmp_path / "maps" / "b.tif").unlink()
-    assert "made again" in rollcli(*line, "--resume", cwd=tmp_path).err
-    assert sorted(contents(tmp_path / "maps")) == ["a.png", "b.tif"]
 
 
 @pytest.mark.slow

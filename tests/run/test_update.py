@@ -49,14 +49,12 @@ def folder(tmp_path):
     return tmp_path
 
 
-def anew(folder, tmp_path_factory, *arguments, status=3, result="rolls.csv", inputs=("maps",)):
-    """What a run makes of the inputs as they are now."""
+def anew(folder, tmp_path_factory, result):
+    """What a run makes of the maps as they are now."""
     other = tmp_path_factory.mktemp("anew")
-    for name in ("maps", "masks", "maps.tar", "calib"):
-        if (folder / name).exists():
-            (other / name).symlink_to(folder / name)
-    estimate(other, *arguments, status=status, result=result, inputs=inputs)
-    return {name: data for name, data in written(other).items() if name not in ("masks", "calib")}
+    (other / "maps").symlink_to(folder / "maps")
+    estimate(other, *IMAGES, status=3, result=result)
+    return written(other)
 
 
 @pytest.mark.parametrize("form", ["csv", "parquet"])
@@ -109,7 +107,7 @@ def test_an_update_does_what_has_changed_and_nothing_else(folder, tmp_path_facto
     done = estimate(folder, *arguments, "--update", status=3, result=result)
     assert "done again, since what they were made from has changed: 2" in done.err
     assert "(6 kept)" in done.err
-    fresh = anew(folder, tmp_path_factory, *IMAGES, result=result)
+    fresh = anew(folder, tmp_path_factory, result)
     assert {name: data for name, data in written(folder).items() if name in fresh} == fresh
     assert {name for name, inode in inodes(folder).items() if before[name] != inode} == {
         "frame0.png",
@@ -159,18 +157,3 @@ def test_objects_are_compared_by_their_tags(tmp_path, bucket, monkeypatch):
     monkeypatch.setattr(result_file, "_read", lambda paths: really(_noted(paths, read)))
     assert "(3 kept)" in estimate(tmp_path, "--update", **line).err
     assert read == [f"{folder}/frame2.png"]
-
-
-@pytest.mark.parametrize("result", ["rolls.csv", "rolls.jsonl"])
-def test_columns_that_come_and_go_with_a_calibration(tmp_path, tmp_path_factory, result):
-    """The column image_roll_deg is there where fx and fy differ, of any frame."""
-    write_maps(tmp_path / "maps", 3)
-    (tmp_path / "calib").mkdir()
-    line = {"inputs": ("maps", "--calib", "calib"), "result": result, "status": 0}
-    for fy in (100, 130, 100):
-        for number in range(3):
-            left = f"P0: 100 0 80 0 0 {fy if number != 1 else 100} 60 0 0 0 1 0\n"
-            text = left + left.replace("P0: 100 0 80 0", "P1: 100 0 80 -50")
-            (tmp_path / "calib" / f"frame{number}.txt").write_text(text)
-        estimate(tmp_path, "--update", **line)
-        assert written(tmp_path)[result] == anew(tmp_path, tmp_path_factory, **line)[result]

@@ -14,7 +14,7 @@ import rollcli as package
 from rollcli.errors import InputError, UsageError
 from rollcli.files.formats import read_image
 from tests.files.recordings.bag_files import KINDS, camera_info, compressed, disparity_image, image, write_bag
-from tests.run_cli import keep_rows, road_map, rollcli, write_pair
+from tests.run_cli import road_map, rollcli, write_pair
 from tests.run_cli import rows_of as rows
 from tests.slow import mostly_slow
 
@@ -202,14 +202,6 @@ def test_what_follows_a_damaged_chunk_of_a_bag_is_used(tmp_path, compression):
     assert [row for row in found if row["status"] != "error"] == [whole[0], *whole[2:]]
     assert found[-1]["file"] == "drive.bag#rest"
     assert "is damaged or cut off at 2" in found[-1]["message"]
-
-
-def test_an_interrupted_run_over_a_bag_is_resumed_to_the_same_bytes(tmp_path):
-    path = write_bag(tmp_path, "drive", "mcap", drive(3)).name
-    rollcli("estimate", path, "-o", "rolls.csv", cwd=tmp_path)
-    whole = keep_rows(tmp_path / "rolls.csv", 1)
-    assert rollcli("estimate", path, "-o", "rolls.csv", "--resume", cwd=tmp_path).status == 0
-    assert (tmp_path / "rolls.csv").read_bytes() == whole
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the bags of other programs are not here")
