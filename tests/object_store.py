@@ -47,6 +47,11 @@ def upload(folder: Path, url: str) -> None:
             write_bytes(f"{url}/{path.relative_to(folder).as_posix()}", path.read_bytes())
 
 
+def objects_below(place: str) -> dict[str, bytes]:
+    """Every object or file below a URL or folder, by its relative name."""
+    return {name: read_bytes(f"{place}/{name}") for name in list_names(place)}
+
+
 def joined(url: str, ending: str = "csv") -> bytes:
     """Put the parts of a result below a URL together; or other objects, whose names end with `ending`."""
     names = sorted(name for name in list_names(url) if name.endswith(ending))

@@ -207,19 +207,16 @@ def test_a_long_run_continues_to_the_same_bytes(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_bucket(tmp_path, store, monkeypatch):
-    for name, value in store.items():
-        monkeypatch.setenv(name, value)
+def test_a_bucket(tmp_path, bucket):
     from rollcli.files.storage import list_names, write_bytes
 
     pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
-    there = f"s3://maps/{tmp_path.name}"
-    write_bytes(f"{there}/run7/frame_0001.png", (SAMPLES / "maps" / "frame_0001.png").read_bytes())
-    words = shlex.split(block("rollcli estimate s3://").replace("s3://drives", there))[1:]
+    write_bytes(f"{bucket}/run7/frame_0001.png", (SAMPLES / "maps" / "frame_0001.png").read_bytes())
+    words = shlex.split(block("rollcli estimate s3://").replace("s3://drives", bucket))[1:]
     done = rollcli_process(*words, cwd=tmp_path)
     assert done.status == 0, done.err
-    assert list(list_names(f"{there}/run7-level")) == ["frame_0001.png"]
-    assert [name for name in list_names(f"{there}/run7.parquet") if name.endswith(".parquet")]
+    assert list(list_names(f"{bucket}/run7-level")) == ["frame_0001.png"]
+    assert [name for name in list_names(f"{bucket}/run7.parquet") if name.endswith(".parquet")]
 
 
 @pytest.mark.slow

@@ -2,8 +2,8 @@
 
 import pytest
 
-from rollcli.files.storage import list_names, read_bytes, remove
-from tests.object_store import joined, upload
+from rollcli.files.storage import remove
+from tests.object_store import joined, objects_below, upload
 from tests.run_cli import contents, rollcli, write_maps
 from tests.store_proxy import Faults, proxied
 
@@ -34,10 +34,7 @@ def test_images_of_kept_rows_that_are_missing_are_made_again(bucket, tmp_path, p
     line = ("estimate", f"{bucket}/maps", "-o", f"{bucket}/rolls.csv", "--derotated", level)
     line = (*line, "--part-rows", "2")
     assert rollcli(*line, cwd=tmp_path).status == 0
-    rows, images = (
-        joined(f"{bucket}/rolls.csv"),
-        {name: read_bytes(f"{level}/{name}") for name in list_names(level)},
-    )
+    rows, images = joined(f"{bucket}/rolls.csv"), objects_below(level)
     for name in ("frame1.png", "frame4.png"):
         remove(f"{level}/{name}")
     listed = rollcli(*line, "--resume", "--dry-run", cwd=tmp_path).out
@@ -49,7 +46,17 @@ def test_images_of_kept_rows_that_are_missing_are_made_again(bucket, tmp_path, p
         done.err
     )
     assert joined(f"{bucket}/rolls.csv") == rows
-    assert {name: read_bytes(f"{level}/{name}") for name in list_names(level)} == images
+    assert objects_below(level) == images
+
+
+def test_a_prefix_with_a_dot_is_a_folder_where_objects_lie_below_it(tmp_path, bucket, store):
+    write_maps(tmp_path / "maps", 2)
+    upload(tmp_path / "maps", f"{bucket}/2024.05.01")
+    folder = rollcli("estimate", f"{bucket}/2024.05.01", cwd=tmp_path, **store)
+    file = rollcli("estimate", f"{bucket}/2024.05.02", cwd=tmp_path, **store)
+    assert folder.status == 0, folder.err
+    assert f"{bucket}/2024.05.01/frame1.png" in folder.out
+    assert "there is no such object" in file.out + file.err
 
 
 MAPS = 80
@@ -76,5 +83,4 @@ def test_requests_that_fail_change_no_byte_of_a_result(store, bucket, local):
     assert min(faults.counts[kind] for kind in ("500", "503", "cut", "never")) > 0, faults.counts
     rows = (local / "rolls.csv").read_bytes().replace(b"maps/", f"{bucket}/maps/".encode())
     assert joined(f"{bucket}/rolls.csv") == rows
-    for name, data in contents(local / "level").items():
-        assert read_bytes(f"{bucket}/level/{name}") == data
+    assert objects_below(f"{bucket}/level") == contents(local / "level")

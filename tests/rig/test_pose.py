@@ -1,7 +1,8 @@
-"""Pitch and height against rigs whose planes are made by ray casting."""
+"""Pitch and height against rigs whose planes are made by ray casting, and on real streets."""
 
 import math
 
+import cv2
 import numpy as np
 import pytest
 
@@ -9,6 +10,8 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.interval import Tangent
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import pose_of, with_pose
+from rollcli.stereo.match import StereoOptions, match_pair
+from tests.run_cli import ROOT
 
 WIDTH, HEIGHT = 320, 200
 
@@ -116,3 +119,35 @@ def test_on_a_bent_road_the_pose_is_that_over_the_road_where_the_tangent_touches
     assert posed.pitch == pytest.approx(pitch + bend, abs=math.radians(0.03))
     over = (height + curvature * far**2 / 2) * math.cos(bend)
     assert posed.height_m == pytest.approx(over, rel=3e-3)
+
+
+STREETS = ROOT.parent / "shared" / "streets"
+KITTIS = Calibration(707.0912, 707.0912, 601.8873, 183.1104, 0.5372)
+RUNS = {"000074": (9, 10, 11), "000151": (7, 8), "000174": (10, 11)}
+
+needs_streets = pytest.mark.skipif(not STREETS.is_dir(), reason=f"{STREETS}, the real streets, are not here")
+
+
+def posed_street(name, downscale=1.0):
+    """A real street with the calibration that KITTI publishes for it."""
+    left, right = (cv2.imread(str(STREETS / side / f"{name}.png"), -1) for side in ("left", "right"))
+    disparity = match_pair(left, right, StereoOptions(downscale=downscale)).disparity
+    calibration = KITTIS.for_size(*left.shape[::-1])
+    return with_pose(estimate_roll(disparity), calibration)
+
+
+@pytest.mark.slow
+@needs_streets
+@pytest.mark.parametrize("run", RUNS)
+def test_the_camera_is_where_kitti_says_and_stays_there(run):
+    heights = [posed_street(f"{run}_{number:02}").height_m for number in RUNS[run]]
+    assert all(1.55 <= height <= 1.75 for height in heights)
+    assert np.ptp(heights) <= 0.03 * np.mean(heights)
+
+
+@pytest.mark.slow
+@needs_streets
+def test_full_and_half_size_agree_within_their_intervals():
+    full, half = posed_street("000174_11"), posed_street("000174_11", 2)
+    assert abs(full.pitch - half.pitch) <= math.hypot(full.pitch_ci95, half.pitch_ci95)
+    assert abs(full.height_m - half.height_m) <= math.hypot(full.height_ci95_m, half.height_ci95_m)

@@ -10,11 +10,12 @@ import pytest
 
 from rollcli.errors import OutputError, UsageError
 from rollcli.files.results import format_header, read_result
-from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
+from rollcli.files.storage import read_bytes, remove, write_bytes
 from rollcli.run import estimate as batch_run
 from rollcli.run import parts, result_file
 from rollcli.run.estimate import estimate_frame
 from rollcli.run.result_file import open_result
+from tests.object_store import objects_below
 from tests.run_cli import contents, road_map, rollcli, started, wait_until, write_kitti, write_maps
 
 FRAMES = 12
@@ -227,7 +228,7 @@ def test_an_image_that_took_the_place_of_one_of_a_stopped_retry_is_kept(stopped)
 def everything(place):
     """What lies in a folder or below a prefix, apart from maps, by its name."""
     if place.startswith("s3://"):
-        return {name: read_bytes(f"{place}{name}") for name in list_names(place)}
+        return objects_below(place.rstrip("/"))
     return made(Path(place))
 
 

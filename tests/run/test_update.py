@@ -4,9 +4,9 @@ import os
 
 import pytest
 
-from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
+from rollcli.files.storage import read_bytes, remove, write_bytes
 from rollcli.run import result_file
-from tests.object_store import upload
+from tests.object_store import objects_below, upload
 from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
 from tests.slow import mostly_slow
 
@@ -66,10 +66,7 @@ def test_a_resume_of_parts_takes_identical_bytes_with_other_times_and_no_others(
         place = request.getfixturevalue("bucket")
 
     def everything(name, less=""):
-        return {
-            each: read_bytes(f"{place}/{name}.{form}{less}/{each}")
-            for each in list_names(f"{place}/{name}.{form}{less}")
-        }
+        return objects_below(f"{place}/{name}.{form}{less}")
 
     line = {"result": f"{place}/rolls.{form}", "status": 3}
     estimate(folder, "--part-rows", "3", **line)

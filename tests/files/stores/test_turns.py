@@ -53,10 +53,8 @@ def test_what_tasks_have_read_ahead_is_bounded_and_no_task_waits_for_ever(monkey
     assert not turns._held_bytes
 
 
-def test_objects_that_tasks_read_count_as_read_ahead(store, monkeypatch):
-    for name, value in store.items():
-        monkeypatch.setenv(name, value)
-    storage.write_bytes("s3://maps/turns/x", b"123")
+def test_objects_that_tasks_read_count_as_read_ahead(bucket):
+    storage.write_bytes(f"{bucket}/x", b"123")
     with computing():
-        assert storage.read_bytes("s3://maps/turns/x") == b"123"
+        assert storage.read_bytes(f"{bucket}/x") == b"123"
         assert list(turns._held_bytes.values()) == [3]

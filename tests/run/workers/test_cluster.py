@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import shutil
 import socket
 import subprocess
@@ -14,11 +15,11 @@ import pytest
 
 from rollcli import __version__
 from rollcli.errors import UsageError
-from rollcli.files.storage import list_names, read_bytes
+from rollcli.files.storage import list_names
 from rollcli.run.workers import cluster
 from rollcli.run.workers.cluster import check_scheduler, probe, scheduler_address
 from tests.in_process import run_here
-from tests.object_store import joined, upload
+from tests.object_store import joined, objects_below, upload
 from tests.run_cli import (
     contents,
     environment,
@@ -336,8 +337,7 @@ def test_workers_that_share_only_a_bucket_give_the_bytes_of_a_local_run(
 
     expected = (local / "rolls.csv").read_bytes().replace(b"maps/", f"{bucket}/maps/".encode())
     assert joined(f"{bucket}/rolls.csv") == expected
-    images = {name: read_bytes(f"{bucket}/upright/{name}") for name in list_names(f"{bucket}/upright")}
-    assert images == contents(local / "upright")
+    assert objects_below(f"{bucket}/upright") == contents(local / "upright")
 
 
 HERE = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": ":0", "threads_per_worker": 1}
@@ -385,3 +385,58 @@ def test_without_the_extra_it_is_named(monkeypatch):
         check_scheduler("tcp://far:1")
     assert str(caught.value).startswith("--scheduler needs the extra cluster: ")
     assert str(caught.value).endswith(" -m pip install distributed")
+
+
+def certificate(folder, name):
+    """A certificate that vouches for itself, and its key."""
+    cert, key = folder / f"{name}.pem", folder / f"{name}.key"
+    line = shlex.split("openssl req -x509 -newkey rsa:2048 -nodes -days 1 -subj /CN=localhost")
+    subprocess.run([*line, "-out", cert, "-keyout", key], check=True, capture_output=True)
+    return cert, key
+
+
+def settings(cert, key, trusted):
+    """Dask's settings as variables: everyone has this certificate, and trusts one."""
+    tls = {
+        f"{role}__{what}": path
+        for role in ("SCHEDULER", "WORKER", "CLIENT")
+        for what, path in (("CERT", cert), ("KEY", key))
+    }
+    tls["CA_FILE"] = trusted
+    named = {f"DASK_DISTRIBUTED__COMM__TLS__{name}": str(path) for name, path in tls.items()}
+    return {**named, "DASK_DISTRIBUTED__COMM__REQUIRE_ENCRYPTION": "True"}
+
+
+@pytest.fixture
+def encrypted(tmp_path):
+    """The address of a scheduler with workers, and the settings of who may take part."""
+    variables = settings(*certificate(tmp_path, "node"), tmp_path / "node.pem")
+    made = Cluster(tmp_path, "--protocol", "tls", **variables)
+    try:
+        made.workers()
+        yield made.address, variables
+    finally:
+        made.end()
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl to make certificates with")
+def test_a_run_on_an_encrypted_cluster_gives_the_same_rows_and_a_stranger_is_refused(tmp_path, encrypted):
+    """Connections are encrypted by Dask's own settings."""
+    address, variables = encrypted
+    assert address.startswith("tls://")
+    write_maps(tmp_path / "maps", 3)
+    rollcli("estimate", "maps", "-q", "-o", "local.csv", cwd=tmp_path)
+
+    done = rollcli(
+        "estimate", "maps", "-q", "-o", "far.csv", "--scheduler", address, cwd=tmp_path, **variables
+    )
+
+    assert (done.status, done.err) == (0, "")
+    assert (tmp_path / "far.csv").read_bytes() == (tmp_path / "local.csv").read_bytes()
+    stranger = settings(*certificate(tmp_path, "stranger"), tmp_path / "node.pem")
+    for others in (stranger, {}):
+        refused = rollcli("estimate", "maps", "-o", "no.csv", "--scheduler", address, cwd=tmp_path, **others)
+        assert refused.status in (1, 2)
+        assert address in refused.err
+        assert refused.err.count("\n") == 1
+        assert not (tmp_path / "no.csv").exists()
