@@ -13,9 +13,7 @@ from rollcli.estimator.request import Request
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import encode_stored, read_stored
 from rollcli.run import images as work
-from rollcli.run.convert import run_conversion
 from rollcli.run.images import convert_frame
-from rollcli.run.options import DerotateOptions, EncodingOptions, InputOptions, RunningOptions
 from tests.run_cli import contents, road_map, rollcli, rows_of, write_kitti, write_maps
 
 TYPES = {
@@ -31,20 +29,6 @@ COMBINATIONS = [
     for (form, dtype), encoding in product(KINDS, STEPS)
     if encoding == "px" or dtype[1] > "1"
 ]
-
-
-def derotated(folder, roll_deg, *, encoding="auto", expand=False, invalid=()):
-    """Every map of folder/maps rotated into folder/out, in this process; the exit status."""
-    return run_conversion(
-        DerotateOptions(
-            inputs=InputOptions((str(folder / "maps"),)),
-            roll_deg=roll_deg,
-            expand=expand,
-            output=str(folder / "out"),
-            encoding=EncodingOptions(encoding, invalid=invalid),
-            running=RunningOptions(jobs=1, quiet=True, overwrite=True),
-        )
-    )
 
 
 def written(folder, form, dtype, encoding):
@@ -63,7 +47,8 @@ def written(folder, form, dtype, encoding):
 def test_a_map_keeps_its_format_type_and_encoding(tmp_path, form, dtype, encoding):
     before, after = written(tmp_path, form, dtype, encoding)
 
-    assert derotated(tmp_path, 4, encoding=encoding) == 0
+    line = ("derotate", "maps", "--roll", "4", "--encoding", encoding, "-o", "out", "-q")
+    assert rollcli(*line, cwd=tmp_path).status == 0
 
     stored = read_stored(after)
     assert (stored.format, stored.values.dtype) == (form, np.dtype(dtype))

@@ -5,6 +5,7 @@ import struct
 import sys
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -43,20 +44,11 @@ def test_of_many_causes_the_first_five_are_said(lines):
     ]
 
 
-class Clock:
-    """A monotonic clock that a test moves."""
-
-    def __init__(self):
-        self.now = 100.0
-
-    def __call__(self):
-        return self.now
-
-
 @pytest.fixture
 def clock(monkeypatch):
-    clock = Clock()
-    monkeypatch.setattr(time, "monotonic", clock)
+    """A monotonic clock that a test moves."""
+    clock = SimpleNamespace(now=100.0)
+    monkeypatch.setattr(time, "monotonic", lambda: clock.now)
     return clock
 
 

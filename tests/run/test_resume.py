@@ -10,16 +10,7 @@ import pytest
 
 from rollcli.files.results import parse_rows
 from rollcli.run.result_file import whole_rows
-from tests.run_cli import (
-    command,
-    contents,
-    ended,
-    environment,
-    rollcli,
-    started,
-    wait_until,
-    write_maps,
-)
+from tests.run_cli import command, contents, ended, environment, rollcli, started, wait_until, write_maps
 from tests.slow import mostly_slow
 
 FRAMES = 40
@@ -58,12 +49,7 @@ def start(folder, *arguments):
 def wait_for_rows(folder, count, run, name="rolls.csv"):
     """Until so many rows are there."""
     result = folder / name
-    wait_until(lambda: lines_of(result) > count, run)
-
-
-def lines_of(result):
-    """How many lines the file has."""
-    return result.read_bytes().count(b"\n") if result.exists() else 0
+    wait_until(lambda: result.exists() and result.read_bytes().count(b"\n") > count, run)
 
 
 def wait_for_images(folder, count, run):
@@ -71,18 +57,13 @@ def wait_for_images(folder, count, run):
     wait_until(lambda: len(list(folder.glob("upright/*.png"))) >= count, run)
 
 
-def kill(run):
-    run.kill()
-    run.wait()
-    run.stderr.close()
-
-
 @pytest.mark.slow
 def test_a_run_killed_again_and_again_ends_in_the_same_bytes_and_leaves_nothing_else(undisturbed, folder):
     for rows, jobs in ((0, "2"), (9, "1"), (21, "2")):
         run = start(folder, "-j", jobs, *(["--resume"] if rows else []))
         wait_for_rows(folder, rows, run)
-        kill(run)
+        run.kill()
+        run.communicate()
     done = rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder)
     assert done.status == 3
     assert results(folder) == results(undisturbed)

@@ -70,14 +70,10 @@ class Thing:
     """What a weak reference can refer to."""
 
 
-def signal_where_python_swallows_it(number):
-    """Let a signal come while the callback of a weak reference runs."""
-
-    def callback(reference):
-        signal.raise_signal(number)
-
+def where_python_swallows_errors(do, *given):
+    """Do something in the callback of a weak reference."""
     thing = Thing()
-    reference = weakref.ref(thing, callback)
+    reference = weakref.ref(thing, lambda _: do(*given))
     del thing
     assert reference() is None
 
@@ -85,7 +81,7 @@ def signal_where_python_swallows_it(number):
 def test_a_second_signal_that_python_swallows_is_not_printed_and_the_next_one_ends_the_run(complaints):
     with stop_on_signals() as stop:
         signal.raise_signal(signal.SIGINT)
-        signal_where_python_swallows_it(signal.SIGINT)
+        where_python_swallows_errors(signal.raise_signal, signal.SIGINT)
         assert stop.asked
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
@@ -94,22 +90,18 @@ def test_a_second_signal_that_python_swallows_is_not_printed_and_the_next_one_en
 
 def test_outside_of_a_run_one_that_python_swallows_is_not_printed_and_the_next_one_counts(complaints):
     raise_on_signals()
-    signal_where_python_swallows_it(signal.SIGTERM)
+    where_python_swallows_errors(signal.raise_signal, signal.SIGTERM)
     with pytest.raises(KeyboardInterrupt):
         signal.raise_signal(signal.SIGINT)
     assert complaints == []
 
 
 def test_other_errors_that_python_swallows_are_told_as_ever(complaints):
-
-    def callback(reference):
+    def fail():
         raise LookupError("as ever")
 
     with stop_on_signals():
-        thing = Thing()
-        reference = weakref.ref(thing, callback)
-        del thing
-    assert reference() is None
+        where_python_swallows_errors(fail)
     assert [type(each.exc_value) for each in complaints] == [LookupError]
     assert sys.unraisablehook == complaints.append
 
