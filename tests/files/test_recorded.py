@@ -67,27 +67,20 @@ def _result(data):
     return [shown, [format_row(row, form).decode() for form in ("csv", "jsonl") for row in rows]]
 
 
+KINDS_OF_URLS = (locations.is_url, locations.is_object_url, locations.is_web_url, locations.is_remote)
+
+OF_MEMBERS = (containers.split_member, containers.frame_name, containers.is_archive)
+
+
 def _url(name):
     return {
-        "kinds": [
-            _answer(function, name)
-            for function in (
-                locations.is_url,
-                locations.is_object_url,
-                locations.is_web_url,
-                locations.is_remote,
-            )
-        ],
+        "kinds": [_answer(function, name) for function in KINDS_OF_URLS],
         "names a file": locations.names_a_file(name),
         "shown": locations.public_name(name),
         "parts": _answer(lambda: locations.is_object_url(name) and locations.split_url(name)),
         "last": _answer(locations.base_name, name),
         "below": _answer(locations.located, "s3://bucket/", name),
-        "container": [
-            containers.split_member(name),
-            containers.frame_name(name),
-            containers.is_archive(name),
-        ],
+        "container": [function(name) for function in OF_MEMBERS],
     }
 
 

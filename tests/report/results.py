@@ -4,6 +4,8 @@ from pathlib import Path
 
 from rollcli.files.results import Row, format_header, format_row
 
+_OF_MAP = {"method": "gd", "alpha0": 20.0, "alpha1": 0.3, "alpha2": 0.0, "width": 160, "height": 120}
+
 
 def row(
     name: str, roll: float | None = 1.0, width: float | None = 0.05, status: str = "ok", message: str = ""
@@ -11,19 +13,7 @@ def row(
     """A row of a 160 x 120 map."""
     if roll is None:
         return Row(name, status="error", message=message or f"{name}: is empty")
-    return Row(
-        name,
-        status=status,
-        roll_deg=roll,
-        roll_ci95_deg=width,
-        method="gd",
-        alpha0=20.0,
-        alpha1=0.3,
-        alpha2=0.0,
-        width=160,
-        height=120,
-        message=message,
-    )
+    return Row(name, "", status, roll, width, message=message, **_OF_MAP)
 
 
 def write_result(path: Path, rows, form="csv") -> None:

@@ -93,16 +93,8 @@ def marched_disparity(spec, road, u, v):
 def test_every_road_pixel_shows_the_first_point_that_a_march_along_its_ray_finds(
     shape, gutter, seed, roll_deg, pitch_deg, curvature
 ):
-    spec = FrameSpec(
-        "open",
-        math.radians(roll_deg),
-        math.radians(pitch_deg),
-        curvature,
-        shape,
-        gutter=gutter,
-        seed=seed,
-        **SMALL,
-    )
+    roll, pitch = map(math.radians, (roll_deg, pitch_deg))
+    spec = FrameSpec("open", roll, pitch, curvature, shape, gutter=gutter, seed=seed, **SMALL)
     road = drawn_road(spec)
     assert (road.course.bend != 0) == (seed == BENT)
     disparity, is_road = true_disparity(spec)

@@ -53,16 +53,8 @@ def test_the_files_are_the_same_whatever_the_jobs_are(tmp_path, rendered):
 
 def test_disparities_beyond_what_the_file_can_hold_are_no_data(tmp_path):
     # the road gains half a pixel of disparity a row, and passes the largest that fits
-    options = SimulateOptions(
-        frames=1,
-        scene="bare",
-        size=(16, 1200),
-        focal=100,
-        baseline=0.5,
-        height=(1, 1),
-        roll_deg=(0, 0),
-        pitch_deg=(5, 5),
-    )
+    rig = {"focal": 100, "baseline": 0.5, "height": (1, 1), "roll_deg": (0, 0), "pitch_deg": (5, 5)}
+    options = SimulateOptions(frames=1, scene="bare", size=(16, 1200), **rig)
     simulate(tmp_path, options)
     (spec,) = plan_dataset(tmp_path, options, overwrite=True).specs
     stored, disparity = read_disparity(tmp_path / "disparity/frame_0001.png"), render_frame(spec).disparity

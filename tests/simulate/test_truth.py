@@ -42,20 +42,13 @@ def rotation(roll, pitch):
 @pytest.mark.parametrize(("roll_deg", "pitch_deg"), [(0, 0), (25, 4), (-60, -2)])
 @pytest.mark.parametrize("centre", [(159.5, 119.5), (130.25, 141.0)])
 def test_points_from_the_disparity_lie_on_the_road(curvature, roll_deg, pitch_deg, centre):
-    spec = FrameSpec(
-        "verge",
-        math.radians(roll_deg),
-        math.radians(pitch_deg),
-        curvature,
-        principal_point=centre,
-        seed=2,
-        **SMALL,
-    )
+    roll, pitch = map(math.radians, (roll_deg, pitch_deg))
+    spec = FrameSpec("verge", roll, pitch, curvature, principal_point=centre, seed=2, **SMALL)
     (cx, cy), (disparity, road) = centre, true_disparity(spec)
     v, u = np.nonzero(road)
     depth = spec.focal * spec.baseline / disparity[road]
     rays = np.stack([(u - cx) / spec.focal, (v - cy) / spec.focal, np.ones(len(u))])
-    turned = rotation(spec.roll, spec.pitch)
+    turned = rotation(roll, pitch)
     x, y, z = turned @ (depth * rays) + np.array([[0.0], [spec.height], [0.0]])
     assert np.abs(y - curvature / 2 * z**2).max() < 1e-9
     # the right camera is a baseline along the rig's own x axis, and sees the point that much to the left

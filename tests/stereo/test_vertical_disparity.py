@@ -29,14 +29,9 @@ def warped(view, lies, disparity=0.0):
     for _ in range(20):  # the fixed point: (at_x, at_y) of the level view lies at (x, y) of this one
         at_x = x - lies.scale * at_x + lies.rotation * at_y
         at_y = y - lies.offset - lies.rotation * at_x - lies.scale * at_y - lies.twist * at_x * at_y
-    at_u, at_v = at_x + (width - 1) / 2 + disparity, at_y + (height - 1) / 2
-    return cv2.remap(
-        view,
-        at_u.astype(np.float32),
-        at_v.astype(np.float32),
-        cv2.INTER_LANCZOS4,
-        borderMode=cv2.BORDER_REFLECT,
-    )
+    at = at_x + (width - 1) / 2 + disparity, at_y + (height - 1) / 2
+    places = (each.astype(np.float32) for each in at)
+    return cv2.remap(view, *places, cv2.INTER_LANCZOS4, borderMode=cv2.BORDER_REFLECT)
 
 
 def wall(disparity=10.0, shape=SHAPE):
