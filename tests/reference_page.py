@@ -1,4 +1,7 @@
-"""Write rollcli/REFERENCE.md from the docstrings of every public name: python -m tests.reference_page"""
+"""Write rollcli/REFERENCE.md from the docstrings of every public name: python -m tests.reference_page
+
+What stands before the functions stays as it is.
+"""
 
 import inspect
 import re
@@ -10,18 +13,6 @@ import rollcli
 from rollcli.files.atomic import write_atomic
 
 PAGE = Path(rollcli.__file__).with_name("REFERENCE.md")
-HEAD = """# Python reference
-`import rollcli` loads nothing else; each name loads when it is first used. Arrays in, frozen dataclasses
-out. Angles are radians; degrees only where a name says `_deg`. What is wrong with a file, an array or a
-number is an error that derives from `RollcliError` and says in one line what to do; an argument of another
-type than documented may raise Python's own. Before each example go `import numpy as np` and
-`from rollcli import *`.
-
-The functions keep no state of their own: threads may call them at the same time. OpenCV divides one match
-among its own threads; for many frames, processes (or the command's `--jobs`) use a machine better.
-
-*Made from the docstrings by `python -m tests.reference_page`.*
-"""
 _SECTION = re.compile(r"^(\w[\w ]*)\n-{3,}\n", flags=re.M)
 _TERM = re.compile(r"^(\S.*?) : (.*)$")
 
@@ -37,7 +28,7 @@ def page() -> str:
             "Functions" if inspect.isfunction(subject) else "Errors" if of_error else "Options and results"
         )
         groups[title].append(name)
-    parts = [HEAD]
+    parts = [PAGE.read_text("utf-8").partition("\n## ")[0]]
     for title, members in groups.items():
         parts.append(f"## {title}\n")
         parts += [part for name in members for part in _entry(name, getattr(rollcli, name))]

@@ -4,7 +4,6 @@ import email
 import os
 import re
 import shutil
-import subprocess
 import sys
 import tarfile
 import zipfile
@@ -14,7 +13,7 @@ import yaml
 
 from rollcli.errors import UsageError
 from rollcli.extras import require_extra
-from tests.run_cli import ROOT, rollcli, write_maps
+from tests.run_cli import ROOT, ended, python, rollcli, write_maps
 
 ACTION = yaml.safe_load((ROOT / ".github" / "action" / "action.yml").read_text("utf-8"))
 SAMPLES = ROOT / "sample_data"
@@ -25,7 +24,7 @@ def built(tmp_path_factory):
     """The folder with wheel and source distribution, as `python -m build` makes them."""
     pytest.importorskip("build", reason="build, of what tests need, is not here")
     source = tmp_path_factory.mktemp("source")
-    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
+    listed = ended(["git", "ls-files"], ROOT)
     if listed.returncode:
         pytest.skip("what belongs to the project is known from git, which this is no checkout of")
     for name in filter(None, listed.stdout.split("\n")):
@@ -50,9 +49,7 @@ def installed(built, tmp_path_factory):
 def _run(*line, cwd, status=0, **variables):
     """Run a line; where the package index cannot be reached, skip."""
     kept = {name: each for name, each in os.environ.items() if not name.startswith("PYTHON")}
-    done = subprocess.run(
-        line, cwd=cwd, env={**kept, **variables}, capture_output=True, text=True, timeout=900, check=False
-    )
+    done = ended(line, cwd, env={**kept, **variables}, timeout=900)
     if re.search(r"Could not find a version|Connection|ProxyError", done.stdout + done.stderr):
         pytest.skip("the package index cannot be reached")
     assert done.returncode == status, done.stdout + done.stderr
@@ -67,9 +64,7 @@ def test_the_source_distribution_holds_tests_and_samples(built):
     for wanted in ("LICENSE", "Makefile", ".ci/run", "tests/run_cli.py", "tests/cli/mistakes.txt"):
         assert wanted in names
     for folder in ("tests", "sample_data", "rollcli"):
-        listed = subprocess.run(
-            ["git", "ls-files", folder], cwd=ROOT, capture_output=True, text=True, check=True
-        )
+        listed = ended(["git", "ls-files", folder], ROOT, check=True)
         assert set(listed.stdout.split()) <= names
     assert not any(name.endswith(".pyc") or name.startswith("out/") for name in names)
 
@@ -226,8 +221,7 @@ def test_ci_runs_on_windows_and_macos_with_tests_that_are_there():
 
 
 def test_what_all_tests_share_limits_the_threads_of_numpy_before_numpy_loads():
-    line = [sys.executable, "-c", "import sys, tests.conftest; sys.exit('numpy' in sys.modules)"]
-    assert subprocess.run(line, cwd=ROOT, check=False).returncode == 0
+    assert python("import sys, tests.conftest; sys.exit('numpy' in sys.modules)", cwd=ROOT).returncode == 0
 
 
 @pytest.mark.parametrize("missing", ["plotly", "jinja2", "matplotlib"])

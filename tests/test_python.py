@@ -7,7 +7,6 @@ import inspect
 import json
 import math
 import re
-import subprocess
 import sys
 import types
 from concurrent.futures import ThreadPoolExecutor
@@ -24,7 +23,7 @@ from rollcli.rig.calibration import Calibration
 from tests import typed_client
 from tests.estimator.synthetic_maps import banked_road
 from tests.reference_page import PAGE, page
-from tests.run_cli import ROOT
+from tests.run_cli import ROOT, ended
 from tests.run_cli import rollcli as run
 
 MAP = ROOT / "sample_data" / "maps" / "frame_0001.png"
@@ -54,19 +53,19 @@ def test_that_client_type_checks_against_an_editable_install(tmp_path):
     for text, status in (("", 0), ("\nrollcli.derotate(1, rol=2)\n", 1)):
         client.write_text(client.read_text("utf-8") + text, "utf-8")
         line = [sys.executable, "-m", "mypy", "--strict", "--no-incremental", "--python-executable", python]
-        done = subprocess.run([*line, "client.py"], cwd=tmp_path, capture_output=True, text=True, check=False)
+        done = ended([*line, "client.py"], tmp_path, env=None)
         assert done.returncode == status, done.stdout + done.stderr
 
 
 def _editable(folder):
     """Make an environment with an editable rollcli, and the packages of this one; return its Python."""
-    subprocess.run([sys.executable, "-m", "venv", "--system-site-packages", str(folder)], check=True)
+    ended([sys.executable, "-m", "venv", "--system-site-packages", folder], ROOT, env=None, check=True)
     (site,) = folder.glob("lib/python*/site-packages")
     others = [path for path in sys.path if "site-packages" in path]
     (site / "others.pth").write_text("\n".join(others) + "\n")
     python = str(folder / "bin" / "python")
     line = [python, "-m", "pip", "install", "--quiet", "--no-deps", "--editable", str(ROOT)]
-    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    done = ended(line, ROOT, env=None)
     if done.returncode:
         pytest.skip(f"pip cannot build here: {done.stderr.strip()[-200:]}")
     return python

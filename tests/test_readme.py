@@ -3,7 +3,6 @@
 import math
 import re
 import shutil
-import subprocess
 import sys
 
 import cv2
@@ -13,7 +12,7 @@ import pytest
 from rollcli import estimate_roll, read_disparity
 from tests.readme_picture import MAP, PICTURE, picture
 from tests.readme_tables import OPTIONS_PAGE, with_tables
-from tests.run_cli import ROOT, environment, rollcli
+from tests.run_cli import ROOT, ended, environment, rollcli
 
 README = (ROOT / "README.md").read_text("utf-8")
 PAGES = [
@@ -107,10 +106,7 @@ def make(folder, target="rolls.html"):
     for inherited in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS"):  # of the make that runs the tests
         variables.pop(inherited, None)
     variables["PATH"] = f"{folder / 'bin'}:{variables['PATH']}"
-    line = ["make", "-j", "2", target]
-    return subprocess.run(
-        line, cwd=folder, env=variables, capture_output=True, text=True, timeout=120, check=False
-    )
+    return ended(["make", "-j", "2", target], folder, env=variables, timeout=120)
 
 
 def touch(path):
