@@ -38,11 +38,9 @@ print("done", sys.stderr.fileno(), sys.stderr.isatty())
 """
 
 
-def reopen_read_only():
-    os.dup2(os.open(os.devnull, os.O_RDONLY), 2)
-
-
-@pytest.mark.parametrize("broken", [None, lambda: os.close(2), reopen_read_only])
+@pytest.mark.parametrize(
+    "broken", [None, lambda: os.close(2), lambda: os.dup2(os.open(os.devnull, os.O_RDONLY), 2)]
+)
 def test_messages_that_cannot_be_written_raise_nothing_and_leave_the_status(broken):
     read, write = os.pipe()
     os.close(read)

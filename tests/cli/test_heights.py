@@ -57,7 +57,9 @@ def test_accuracy_compares_heights_where_truth_has_them(rendered):
         assert float(figures[f"over_road_at_{distance}_m_median_m"]) == pytest.approx(expected, abs=2e-6)
     table = rollcli(*arguments[:-2], cwd=rendered).out
     assert "heights, 10 m, median" in table
-    assert "heights" not in rollcli(*arguments[:-2], "--truth", "none/truth.csv", cwd=_apart(rendered)).out
+    (rendered / "none").mkdir()  # the same truth without heights
+    (rendered / "none" / "truth.csv").write_bytes((rendered / "truth.csv").read_bytes())
+    assert "heights" not in rollcli(*arguments[:-2], "--truth", "none/truth.csv", cwd=rendered).out
 
 
 def test_heights_of_another_size_do_not_keep_accuracy_from_comparing_angles(tmp_path, rendered):
@@ -71,13 +73,6 @@ def test_heights_of_another_size_do_not_keep_accuracy_from_comparing_angles(tmp_
     assert "no heights are compared: half/frame_0001.tif" in done.err
     assert "differ in size" in done.err
     assert rollcli(*arguments, "--heights", "half", cwd=tmp_path).status == 2
-
-
-def _apart(rendered):
-    """The same folder, with its truth without heights."""
-    (rendered / "none").mkdir(exist_ok=True)
-    (rendered / "none" / "truth.csv").write_bytes((rendered / "truth.csv").read_bytes())
-    return rendered
 
 
 def test_heights_of_a_result_are_those_of_the_run(rendered):

@@ -10,14 +10,6 @@ from tests.slow import mostly_slow
 FRAMES = 2
 
 
-def refused(folder, *words):
-    """The one line of a usage error; nothing was written."""
-    before = contents(folder)
-    refusal = rollcli(*words, cwd=folder).refused()
-    assert contents(folder) == before
-    return refusal
-
-
 def test_names_that_differ_in_case_are_one_where_the_folder_ignores_case(tmp_path):
     write_kitti(tmp_path / "one" / "a.png", road_map())
     write_kitti(tmp_path / "two" / "A.png", road_map())
@@ -29,7 +21,10 @@ def test_names_that_differ_in_case_are_one_where_the_folder_ignores_case(tmp_pat
     (tmp_path / "out" / "nAME").hardlink_to(tmp_path / "out" / "Name")
     for path in (tmp_path / "out").glob("?.png"):
         path.unlink()
-    assert "one/a.png and two/A.png would both write" in refused(tmp_path, "estimate", *arguments)
+    before = contents(tmp_path)
+    refusal = rollcli("estimate", *arguments, cwd=tmp_path).refused()
+    assert "one/a.png and two/A.png would both write" in refusal
+    assert contents(tmp_path) == before
 
 
 # commands that look, work and write, and the last of what each writes

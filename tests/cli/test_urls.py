@@ -111,10 +111,6 @@ BAD = (
 )
 
 
-def keys_of(store):
-    return {name.lower(): store[name] for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY")}
-
-
 def written(folder):
     return sorted(contents(folder))
 
@@ -146,7 +142,8 @@ def test_names_of_objects_are_checked_likewise(tmp_path, bucket, store):
     write_maps(tmp_path / "map", 1)
     data = (tmp_path / "map" / "frame0.png").read_bytes()
     names = ["a\\..\\..\\evil.png", "C:\\evil.png", "a:b.png", "2024-05-01T12:00:00.png"]
-    client = boto3.client("s3", "us-east-1", endpoint_url=store["AWS_ENDPOINT_URL"], **keys_of(store))
+    keys = {name.lower(): store[name] for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY")}
+    client = boto3.client("s3", "us-east-1", endpoint_url=store["AWS_ENDPOINT_URL"], **keys)
     for name in names:
         client.put_object(Bucket="maps", Key=f"{tmp_path.name}/{name}", Body=data)
     done = rollcli("estimate", f"{bucket}/", "-o", "r.csv", "--derotated", "up", cwd=tmp_path, **store)

@@ -268,16 +268,13 @@ GRID = Grid.of_shape(375, 1242)
 THETA = 0.2
 
 
-def jackknife_of(bands, columns, white):
-    return Jackknife(np.array(bands), np.array(columns), np.array(white), (3.0, 5.0), 0.0, 0.0, None)
-
-
 @pytest.mark.parametrize("size", [1.0, 1e-4])
 def test_errors_have_the_covariance_that_those_of_the_parabola_imply(size):
     rng = np.random.default_rng(5)
     bands, columns, roots = (size * rng.normal(size=shape) for shape in ((6, 4), (6, 4), (4, 4)))
     white = roots @ roots.T
-    tangent = touch((30.0, 0.3, 1e-5), THETA, GRID, None, jackknife_of(bands, columns, white))
+    errors = Jackknife(bands, columns, white, (3.0, 5.0), 0.0, 0.0, None)
+    tangent = touch((30.0, 0.3, 1e-5), THETA, GRID, None, errors)
     # by hand: (a0, a1, a2, theta) are independent sums of all groups, and of the textbook's 95 % half-widths
     covariance = bands.T @ bands + columns.T @ columns + 1.96**2 * white
     across = GRID.centre_u * math.cos(THETA) + GRID.centre_v * math.sin(THETA)

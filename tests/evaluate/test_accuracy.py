@@ -1,7 +1,6 @@
 """Errors of a result against known angles."""
 
 import dataclasses
-import math
 
 import numpy as np
 import pytest
@@ -25,10 +24,6 @@ def rows(*angles, ci95=None, folder="maps/", ending=".png", status="ok"):
     ]
 
 
-def truth(*degrees):
-    return {f"frame{k}": KnownPose(math.radians(angle)) for k, angle in enumerate(degrees, 1)}
-
-
 def test_heights_are_compared_at_their_distances_where_all_that_takes_is_there(tmp_path):
     disparity = np.array([[20, 10, 10, 1, 0]] * 2, np.float32)  # 5, 10, 10 and 100 m ahead, and no road
     off = np.array([[0.25, -0.5, np.nan, 9, 9], [0.75, -0.5, -0.5, 9, 9]], np.float32)
@@ -50,7 +45,8 @@ def test_heights_are_compared_at_their_distances_where_all_that_takes_is_there(t
 
 
 def test_an_error_of_just_the_limit_is_not_above_it_and_just_of_the_interval_is_inside():
-    found = assess(rows(0.5, -0.5, 0.25, ci95=0.5), truth(0, 0, 0))
+    level = {f"frame{k}": KnownPose(0.0) for k in (1, 2, 3)}
+    found = assess(rows(0.5, -0.5, 0.25, ci95=0.5), level)
     assert (found.roll.share_above_0_5_deg, found.roll.coverage_95) == (0, 1)
     assert (found.roll.worst, found.roll.worst_file) == (0.5, "maps/frame1.png")
     given = dataclasses.replace(rows(0.0)[0], pitch_deg=0.5, pitch_ci95_deg=0.5)

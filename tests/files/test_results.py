@@ -86,15 +86,6 @@ def bytes_of(form):
     return format_header(form) + b"".join(format_row(row, form) for row in rows)
 
 
-def check(found):
-    rows = [*ROWS, LAST]
-    assert found.files == [row.file for row in rows]
-    assert [STATUSES[status] for status in found.status] == [row.status for row in rows]
-    assert found.numbers["roll_deg"].tolist() == [float(f"{row.roll_deg:.6f}") for row in rows]
-    assert np.isnan(found.numbers["pitch_deg"]).all()
-    assert found.methods == {"gd", "gss"}
-
-
 @pytest.mark.parametrize(
     ("form", "before"),
     [*itertools.product(("csv", "jsonl"), (b"", b"\xef\xbb\xbf")), ("parquet", b"")],
@@ -103,9 +94,12 @@ def test_columns_are_those_of_the_rows(tmp_path, form, before):
     (tmp_path / "rolls").write_bytes(before + bytes_of(form))
     (tmp_path / "rolls.run.json").write_text('{"rollcli": "1"}')
 
-    found = read_columns(str(tmp_path / "rolls"), ["roll_deg", "pitch_deg"])
-
-    check(found)
+    found, rows = read_columns(str(tmp_path / "rolls"), ["roll_deg", "pitch_deg"]), [*ROWS, LAST]
+    assert found.files == [row.file for row in rows]
+    assert [STATUSES[status] for status in found.status] == [row.status for row in rows]
+    assert found.numbers["roll_deg"].tolist() == [float(f"{row.roll_deg:.6f}") for row in rows]
+    assert np.isnan(found.numbers["pitch_deg"]).all()
+    assert found.methods == {"gd", "gss"}
     assert found.run == {"rollcli": "1"}
 
 

@@ -95,14 +95,11 @@ def test_disparities_are_counted_in_the_bins_that_hold_them(monkeypatch, block):
 SHAPE = (97, 141)
 
 
-def with_holes(values, share=0.1, seed=0):
-    return np.where(np.random.default_rng(seed).random(values.shape) < share, 0, values)
-
-
 @pytest.mark.parametrize("roll_deg", [-30, -3, 3, 30])
 def test_the_estimate_on_the_result_is_zero(roll_deg):
     theta = math.radians(roll_deg)
-    disparity = with_holes(road_map(theta, width=141, height=97, noise=0))
+    holes = np.random.default_rng(0).random(SHAPE) < 0.1
+    disparity = np.where(holes, 0, road_map(theta, width=141, height=97, noise=0))
 
     found = estimate_roll(disparity, Request(road="all")).theta
 

@@ -14,17 +14,10 @@ from rollcli.rig.quantities import ROLL
 from tests.report.results import row
 
 
-def traces_of(chart):
-    return {trace["name"]: trace for trace in chart.data}
-
-
-def traces(rows):
-    return traces_of(chart_over_frames(rows, ROLL, assess_rig(rows)))
-
-
 @pytest.mark.parametrize(("frames", "bars"), [(400, True), (402, False)])
 def test_suspect_marks_lie_below_the_line_and_have_no_bars_in_long_runs(frames, bars):
-    shown = traces([row("a.png"), row("b.png", 9.0, 1.0, "suspect")] * (frames // 2))
+    rows = [row("a.png"), row("b.png", 9.0, 1.0, "suspect")] * (frames // 2)
+    shown = {trace["name"]: trace for trace in chart_over_frames(rows, ROLL, assess_rig(rows)).data}
     alone = [] if bars else ["roll, alone"]
     assert list(shown) == ["95 % interval", "suspect", "roll", *alone, "mounting, 95 %", "mounting"]
     assert ("error_y" in shown["suspect"]) == bars

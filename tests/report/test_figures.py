@@ -49,14 +49,9 @@ def drawn(rows, name="roll"):
     return decoded(chart_file(all_charts(rows, assess_rig(rows))[name], "png"))
 
 
-def texts(svg):
-    return [each.text for each in ET.fromstring(svg).iter(f"{SVG}text")]
-
-
 @pytest.mark.parametrize("name", ["roll", "histogram"])
 def test_an_svg_has_the_size_of_a_slide_a_title_axes_with_units_and_a_legend(charts, name):
-    svg = chart_file(charts[name], "svg")
-    root = ET.fromstring(svg)
+    root = ET.fromstring(chart_file(charts[name], "svg"))
     assert (root.get("width"), root.get("height")) == ("960pt", "420pt")
     begins = {"roll": "Roll in degrees", "histogram": "How many"}[name]
     assert next(root.iter("{http://purl.org/dc/elements/1.1/}title")).text.startswith(begins)
@@ -64,7 +59,8 @@ def test_an_svg_has_the_size_of_a_slide_a_title_axes_with_units_and_a_legend(cha
         "roll": ["frame", "roll, degrees", "95 % interval", "suspect", "failed", "jump", "mounting"],
         "histogram": ["frames", "roll, degrees", "ok", "suspect"],
     }[name]
-    assert [each for each in expected if each not in texts(svg)] == []
+    texts = [each.text for each in root.iter(f"{SVG}text")]
+    assert [each for each in expected if each not in texts] == []
 
 
 def test_a_pdf_has_the_same_size_and_its_letters_are_letters(charts):

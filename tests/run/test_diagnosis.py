@@ -21,21 +21,13 @@ def verdict(values):
     return looks_like(to_disparity(stored).disparity, stored, FrameOptions())
 
 
-def depth_of(disparity):
-    return np.where(disparity > 0, 150 / np.where(disparity > 0, disparity, 1), 0)
-
-
-def stretched(disparity):
-    return np.rint(disparity * (255 / disparity.max())).astype(np.uint8)
-
-
 @pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.name)
 def test_a_map_is_taken_for_nothing_else_and_its_depths_and_its_reverse_are_known(path):
     disparity = read_disparity(path)
-    depth = depth_of(disparity)
+    depth = np.where(disparity > 0, 150 / np.where(disparity > 0, disparity, 1), 0)
 
     assert verdict(read_stored(path).values) == ""
-    assert verdict(stretched(disparity)) == ""
+    assert verdict(np.rint(disparity * (255 / disparity.max())).astype(np.uint8)) == ""  # stretched
     assert DEPTH in verdict(depth.astype(np.float32))
     assert DEPTH in verdict(np.clip(np.rint(1000 * depth), 0, 65535).astype(np.uint16))
     assert UPSIDE_DOWN in verdict(disparity[::-1])  # or a depth map: few roads tell which

@@ -4,7 +4,6 @@ import os
 import struct
 import sys
 import time
-from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -24,10 +23,6 @@ def progress(total=3, encoding=GUESSED, **running):
 MAP = Frame("a.png", "", "a.png", "", "a.png", None)
 
 
-def failed(name, message, cause):
-    return failed_frame(replace(MAP, file=name), message, cause)
-
-
 @pytest.fixture
 def lines(capsys):
     return lambda: capsys.readouterr().err.splitlines()
@@ -36,10 +31,10 @@ def lines(capsys):
 def test_of_many_causes_the_first_five_are_said(lines):
     counted = progress(quiet=True)
     for cause in "abcdefg":
-        counted.add(failed("x", cause, cause))
+        counted.add(failed_frame(MAP, cause, cause))
     counted.tell_end()
     assert lines() == [
-        *(f"rollcli: x: {cause}" for cause in "abcde"),
+        *(f"rollcli: a.png: {cause}" for cause in "abcde"),
         "rollcli: 2 further frames: other causes, which -v names",
     ]
 

@@ -33,10 +33,6 @@ def rendered(tmp_path_factory):
     return folder
 
 
-def rows(folder):
-    return rows_of((folder / "truth.csv").read_text())
-
-
 @pytest.mark.parametrize("roll_deg", [-30, 0, 12])
 def test_the_nearest_disparity_is_that_of_the_corner_of_the_image_nearest_to_the_road(tmp_path, roll_deg):
     asked = SimulateOptions(
@@ -106,7 +102,7 @@ def test_the_script_makes_the_same_pictures(made):
 
 @pytest.mark.parametrize(("stem", "spec"), list(zip(STEMS, SPECS, strict=True)))
 def test_each_map_shows_its_scene_with_the_roll_that_truth_says(stem, spec):
-    found = {row["file"]: row for row in rows(SAMPLES)}
+    found = {row["file"]: row for row in rows_of((SAMPLES / "truth.csv").read_text())}
     assert float(found[stem]["roll_deg"]) == pytest.approx(math.degrees(spec.roll))
     (path,) = (SAMPLES / "maps").glob(f"{stem}.*")
     found, (disparity, road) = read_disparity(path), true_disparity(spec)

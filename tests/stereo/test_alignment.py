@@ -329,10 +329,6 @@ def test_real_street_pairs_are_levelled_by_what_was_added(clockwise_deg, larger_
 SHAPE = (200, 240)
 
 
-def parts(offset=0.0, rotation=0.0, scale=0.0, corners=0.0, shape=SHAPE):
-    return Misalignment(offset, rotation, scale, corners / (shape[0] * shape[1] / 4))
-
-
 @pytest.mark.parametrize(
     "lies",
     [
@@ -370,7 +366,8 @@ def test_a_level_view_is_not_touched():
 
 @pytest.mark.parametrize("hidden", [-0.5, 0.0, 0.4, 0.66])
 def test_two_measurements_tell_what_a_map_hides(hidden):
-    rig, approach, at = parts(2, 0.01, -0.004, 0.8), Approach(SHAPE), LEVEL
+    twist = 0.8 / (SHAPE[0] * SHAPE[1] / 4)  # 0.8 px in the corners
+    rig, approach, at = Misalignment(2, 0.01, -0.004, twist), Approach(SHAPE), LEVEL
     for _ in range(2):
         at = approach.next(at, rig - (rig - at).times(hidden))
 

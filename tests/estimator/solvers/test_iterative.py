@@ -97,17 +97,9 @@ class Curve:
         return Terms(*(function(theta) for function in self.functions))
 
 
-def parabola(lowest=1.0, curvature=2.0):
-    return Curve(
-        lambda theta: curvature / 2 * (theta - lowest) ** 2,
-        lambda theta: curvature * (theta - lowest),
-        lambda theta: curvature,
-    )
-
-
 @pytest.mark.parametrize("lowest", [-1.0, 1.0])
 def test_no_step_is_longer_than_20_degrees(lowest):
-    curve = parabola(lowest)
+    curve = Curve(lambda theta: (theta - lowest) ** 2, lambda theta: 2 * (theta - lowest), lambda theta: 2.0)
     assert gradient_descent(curve, SolverSettings(1e-9, lambda0=1e6)).theta == pytest.approx(lowest)
     steps = np.diff(curve.asked)
     assert np.abs(steps).max() == pytest.approx(math.radians(20))

@@ -55,13 +55,6 @@ def installed(request, monkeypatch):
     return request.param
 
 
-def decoded(values, filters):
-    """Decode a file whose rows have these filters, one after the other; the options do not reach OpenCV."""
-    height, width = values.shape
-    plain = filtered(values, filters)
-    return png.decode_grey(zlib.compress(plain), width, height, 8 * values.itemsize)
-
-
 def grey_file(width, height, packed, depth=16):
     return png_file(png_header(width, height, depth), (b"IDAT", packed), (b"IEND", b""))
 
@@ -89,10 +82,11 @@ def filtered(values, filters):
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
 def test_rows_of_every_filter_read_as_opencv_reads_them(installed, kind, shape, filters):
     values = np.random.default_rng(1).integers(0, np.iinfo(kind).max, shape, dtype=kind, endpoint=True)
-    file = grey_file(*shape[::-1], zlib.compress(filtered(values, filters)), 8 * values.itemsize)
+    packed, depth = zlib.compress(filtered(values, filters)), 8 * values.itemsize
+    file = grey_file(*shape[::-1], packed, depth)
     np.testing.assert_array_equal(cv2.imdecode(np.frombuffer(file, np.uint8), cv2.IMREAD_UNCHANGED), values)
 
-    found = decoded(values, filters)
+    found = png.decode_grey(packed, *shape[::-1], depth)  # not by OpenCV
 
     assert (found is None) == (max(filters[: shape[0]]) > 1)
     if found is not None:

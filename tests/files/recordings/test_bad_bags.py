@@ -18,10 +18,6 @@ def views(tmp_path):
     return [cv2.imread(str(tmp_path / side / "0.png"), 0) for side in ("left", "right")]
 
 
-def refused(tmp_path, *given):
-    return rollcli("estimate", *given, cwd=tmp_path).refused()
-
-
 def test_sizes_that_change_within_a_drive_are_told(tmp_path, views):
     left, right = views
 
@@ -52,7 +48,8 @@ def test_without_the_extra_a_line_says_what_to_install(tmp_path):
 
 def test_a_topic_without_messages_is_refused_with_a_line(tmp_path):
     (tmp_path / "drive.mcap").write_bytes(mcap(data=()))
-    assert "drive.mcap: has no messages of /a" in refused(tmp_path, "drive.mcap", "--topic", "/a")
+    said = rollcli("estimate", "drive.mcap", "--topic", "/a", cwd=tmp_path).refused()
+    assert "drive.mcap: has no messages of /a" in said
 
 
 def test_frames_of_a_video_in_a_bag_say_what_to_do(tmp_path):

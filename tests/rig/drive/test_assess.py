@@ -85,12 +85,8 @@ def test_frames_whose_own_errors_explain_how_far_off_they_are_are_no_outliers(se
     assert assess_sequence(values, errors).outliers == 1
 
 
-def white(frames, sd=0.1, seed=0):
-    return np.random.default_rng(seed).normal(0, sd, frames)
-
-
 def test_a_drift_beside_a_jump_is_that_of_the_line_between_levels():
-    values = white(200, 0.05) + np.linspace(0, 1, 200)
+    values = np.random.default_rng(0).normal(0, 0.05, 200) + np.linspace(0, 1, 200)
     values[100:] += 2.0
     found = assess_sequence(values, np.full(200, 0.01))
     (jump,) = found.jumps
