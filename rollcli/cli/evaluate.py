@@ -10,10 +10,7 @@ from rollcli.cli.types import DIR, FILE, PATH, TABLE_FILE, TABLE_FORMATS, TURNS,
 from rollcli.evaluate.options import AccuracyOptions, ExperimentOptions, PaperOptions
 
 
-@command(
-    fields=AccuracyOptions,
-    short_help="Errors of a result against known angles.",
-)
+@command(fields=AccuracyOptions, short_help="Errors of a result against known angles.")
 @click.argument("result", type=PATH)
 @option("--truth", FILE, required=True, section="Figures")
 @option("--heights", DIR, section="Figures")
@@ -51,9 +48,7 @@ experiment_options = record(
 )
 
 
-@command(
-    short_help="The paper's tables and figures on your maps.",
-)
+@command(short_help="The paper's tables and figures on your maps.")
 @input_options
 @experiment_options
 @encoding_options

@@ -198,8 +198,7 @@ method_options = record(
         "--tolerance",
         Number("DEG", above=0, at_most=90),
         Needs(
-            lambda ctx: ctx.params["method"] not in AREAS,
-            "--method {method} does not iterate on the angle",
+            lambda ctx: ctx.params["method"] not in AREAS, "--method {method} does not iterate on the angle"
         ),
     ),
     option(

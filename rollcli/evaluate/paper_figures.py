@@ -24,10 +24,7 @@ def paper_figures(tables: Mapping[str, Table]) -> dict[str, Drawing]:
     """Return every chart of the page, by the name of its table."""
     made = {
         "table1_iterations": (_iterations, "Iterations of both solvers by tolerance, beside the paper's"),
-        "table2_runtime": (
-            _runtime,
-            "Run time of both solvers in three forms and in the paper, logarithmic",
-        ),
+        "table2_runtime": (_runtime, "Run time of both solvers in three forms and in the paper, logarithmic"),
         "fig3_lambda0": (_sweep, "Iterations of gradient descent by its first learning rate"),
         "fig6_accuracy": (_solvers, "Mean error of three solvers after known rotations, by tolerance"),
         "methods_accuracy": (_methods, "Median, 95 % and worst error of five methods after known rotations"),

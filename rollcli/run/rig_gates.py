@@ -227,10 +227,7 @@ def check_options(gates: GateOptions) -> None:
 
 
 def run_checks(
-    rig: RigAssessment,
-    gates: GateOptions,
-    missing: str = "",
-    change: Estimate | None = None,
+    rig: RigAssessment, gates: GateOptions, missing: str = "", change: Estimate | None = None
 ) -> list[Check]:
     """Check what was asked; want of data tells nothing.
 

@@ -10,14 +10,7 @@ from numpy.typing import NDArray
 
 from rollcli.simulate.materials import Plain, Values
 from rollcli.simulate.relief import LEVEL, Dip
-from rollcli.simulate.road import (
-    Carriageway,
-    Piece,
-    Site,
-    cross_section,
-    draw_asphalt,
-    draw_carriageway,
-)
+from rollcli.simulate.road import Carriageway, Piece, Site, cross_section, draw_asphalt, draw_carriageway
 from rollcli.simulate.scene import FAR, Light, Scene, draw, draw_light, draw_offset
 from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Ground, Surface

@@ -18,14 +18,7 @@ from numpy.typing import NDArray
 from rollcli.stereo.alignment import level, seen_from_right
 from rollcli.stereo.misalignment import Misalignment
 from rollcli.stereo.options import StereoOptions
-from rollcli.stereo.sgbm import (
-    NARROWEST,
-    SUBPIXELS,
-    match_below,
-    match_views,
-    usable_range,
-    without_lag,
-)
+from rollcli.stereo.sgbm import NARROWEST, SUBPIXELS, match_below, match_views, usable_range, without_lag
 from rollcli.stereo.views import (
     Map,
     Views,

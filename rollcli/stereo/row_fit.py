@@ -462,12 +462,7 @@ def _robust(
 
 
 def _settled(
-    fit: _Fit,
-    design: Doubles,
-    shift: Doubles,
-    fixed: Doubles,
-    spread: float,
-    held: Doubles | float = 0.0,
+    fit: _Fit, design: Doubles, shift: Doubles, fixed: Doubles, spread: float, held: Doubles | float = 0.0
 ) -> _Fit:
     """Go on from a fit, each block weighed by how far off it was, until its values stay; `spread` is held."""
     for _ in range(_FIT_ROUNDS):

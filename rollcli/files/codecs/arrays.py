@@ -25,11 +25,7 @@ _ENTRIES = {
     "shape": re.compile(r"""['"]shape['"]\s*:\s*\(((?:\s*\d{1,18}L?\s*,)*(?:\s*\d{1,18}L?)?)\s*\)"""),
 }
 _REAL = re.compile(r"[<>|=]?[biuf]\d+")
-_UNREAL = {
-    "O": "Python objects (a pickle, which is never loaded)",
-    "c": "complex numbers",
-    "[": "records",
-}
+_UNREAL = {"O": "Python objects (a pickle, which is never loaded)", "c": "complex numbers", "[": "records"}
 
 
 def decode_npy(data: bytes, name: str) -> NDArray[Any]:

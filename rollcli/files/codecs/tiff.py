@@ -14,13 +14,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 from rollcli.files.codecs.png import decoding
-from rollcli.files.codecs.raw_map import (
-    COLOUR_REMEDY,
-    Stored,
-    native,
-    require_decoded_fits,
-    require_pixels,
-)
+from rollcli.files.codecs.raw_map import COLOUR_REMEDY, Stored, native, require_decoded_fits, require_pixels
 
 _NONE, _LZW, _DEFLATE, _OLD_DEFLATE, _PACKBITS = 1, 5, 8, 32946, 32773
 # how many bytes one byte can stand for
