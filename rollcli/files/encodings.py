@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import UsageError
-from rollcli.files.formats import Stored, decode_mask, read_stored
-from rollcli.files.storage import read_bytes
+from rollcli.files.formats import Stored, read_stored
 from rollcli.rig.calibration import Calibration, require_calibration
 
 
@@ -179,11 +178,6 @@ def to_kitti(disparity: NDArray[Any]) -> NDArray[np.uint16]:
     numbers = np.rint(np.where(fits, disparity, 0).astype(np.float64) / _SCALE[Encoding.KITTI])
     stored: NDArray[np.uint16] = np.where(fits, np.maximum(numbers, 1), 0).astype(np.uint16)
     return stored
-
-
-def read_mask(path: str | Path, name: str | None = None) -> NDArray[np.bool_]:
-    """Read a mask: True where any channel is non-zero; shape (H, W). Errors call it `name`, or its path."""
-    return decode_mask(read_bytes(path, name), name or str(path))
 
 
 def resolve_encoding(encoding: str, dtype: np.dtype[Any], scale: float | None) -> Encoding:

@@ -263,7 +263,7 @@ class Search:
         """Yield the files that match; unless the pattern names an ending, only readable ones."""
         ending = Path(pattern).suffix
         at_its_word = ending != "" and not glob.has_magic(ending)
-        base = _fixed_part(pattern)
+        base = Path(*itertools.takewhile(lambda part: not glob.has_magic(part), Path(pattern).parts))
         for match in _matches(pattern):
             path = Path(match)
             relative = Path(os.path.relpath(path, base))
@@ -345,8 +345,3 @@ def _identity(folder: str | Path) -> tuple[int, int]:
     except OSError:
         return _NOWHERE
     return found.st_dev, found.st_ino
-
-
-def _fixed_part(pattern: str) -> Path:
-    """Find the folder before the first wildcard."""
-    return Path(*itertools.takewhile(lambda part: not glob.has_magic(part), Path(pattern).parts))

@@ -16,10 +16,10 @@ from rollcli.errors import EstimationError, InputError, UsageError, raised_at
 from rollcli.estimator.request import Request
 from rollcli.estimator.road.find import road_plane
 from rollcli.files.codecs.pictures import views_of
-from rollcli.files.encodings import Encoding, read_mask, to_disparity
-from rollcli.files.formats import Stored, read_image, read_stored
+from rollcli.files.encodings import Encoding, to_disparity
+from rollcli.files.formats import Stored, decode_mask, read_image, read_stored
 from rollcli.files.results import ALIGNMENT_COLUMNS
-from rollcli.files.storage import noting, state_of
+from rollcli.files.storage import noting, read_bytes, state_of
 from rollcli.messages import one_line
 from rollcli.run.diagnosis import require_positive, too_large
 from rollcli.run.frame import Decoded, Frame, FrameResult, failed_frame
@@ -66,7 +66,7 @@ def _drawn(options: RegionOptions, shape: tuple[int, ...]) -> NDArray[np.bool_]:
 
 @lru_cache(maxsize=1)  # a mask for all frames is read once, unless it changes: workers outlive runs
 def _mask_file(path: str, name: str, state: str) -> NDArray[np.bool_]:
-    return read_mask(path, name)
+    return decode_mask(read_bytes(path, name), name)
 
 
 def _size(shape: tuple[int, ...]) -> str:
