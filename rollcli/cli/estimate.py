@@ -9,19 +9,8 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+from rollcli.cli import options as shared
 from rollcli.cli.command import command, config_option, option, record
-from rollcli.cli.options import (
-    calibration_options,
-    cluster_options,
-    encoding_options,
-    image_options,
-    input_options,
-    method_options,
-    pair_options,
-    region_options,
-    stereo_options,
-    topic_options,
-)
 from rollcli.cli.types import FLAG, SHARD, Choice, Number, OutputFile
 from rollcli.messages import without_secrets
 from rollcli.run.options import EstimateOptions, ResultOptions
@@ -101,17 +90,17 @@ result_options = record(
 
 
 @command()
-@input_options
-@pair_options
-@topic_options
+@shared.input_options
+@shared.pair_options
+@shared.topic_options
 @result_options
-@image_options
-@encoding_options
-@region_options
-@calibration_options
-@cluster_options
-@method_options
-@stereo_options
+@shared.image_options
+@shared.encoding_options
+@shared.region_options
+@shared.calibration_options
+@shared.cluster_options
+@shared.method_options
+@shared.stereo_options
 @config_option
 @click.pass_context
 def estimate(ctx: click.Context, /, **records: Any) -> None:

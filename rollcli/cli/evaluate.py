@@ -4,8 +4,8 @@ from typing import Any
 
 import click
 
+from rollcli.cli import options as shared
 from rollcli.cli.command import command, config_option, option, record
-from rollcli.cli.options import encoding_options, input_options, region_options, running_options
 from rollcli.cli.types import DIR, FILE, PATH, TABLE_FILE, TABLE_FORMATS, TURNS, Choice, Number, table_format
 from rollcli.evaluate.options import AccuracyOptions, ExperimentOptions, PaperOptions
 
@@ -16,7 +16,7 @@ from rollcli.evaluate.options import AccuracyOptions, ExperimentOptions, PaperOp
 @option("--heights", DIR, section="Figures")
 @option("-o, --output", TABLE_FILE, default="-", section="Figures")
 @option("--format", Choice(*TABLE_FORMATS), section="Figures")
-@running_options
+@shared.running_options
 @config_option
 @click.pass_context
 def accuracy(ctx: click.Context, /, **options: Any) -> None:
@@ -49,11 +49,11 @@ experiment_options = record(
 
 
 @command(short_help="The paper's tables and figures on your maps.")
-@input_options
+@shared.input_options
 @experiment_options
-@encoding_options
-@region_options
-@running_options
+@shared.encoding_options
+@shared.region_options
+@shared.running_options
 @config_option
 @click.pass_context
 def paper(ctx: click.Context, /, **records: Any) -> None:

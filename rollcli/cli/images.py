@@ -4,20 +4,8 @@ from typing import Any
 
 import click
 
+from rollcli.cli import options as shared
 from rollcli.cli.command import command, config_option, option, section
-from rollcli.cli.options import (
-    calibration_options,
-    cluster_options,
-    encoding_options,
-    heights_range_option,
-    input_options,
-    output_folder_option,
-    pair_input_options,
-    pair_options,
-    save_as_option,
-    stereo_options,
-    topic_options,
-)
 from rollcli.cli.types import DIR, FLAG, RESULT, Choice, Number
 from rollcli.run.options import (
     ConvertOptions,
@@ -45,11 +33,11 @@ rotation_options = section(
 
 
 @command(fields=DerotateOptions)
-@input_options
+@shared.input_options
 @rotation_options
-@output_folder_option
-@encoding_options
-@cluster_options
+@shared.output_folder_option
+@shared.encoding_options
+@shared.cluster_options
 @config_option
 @click.pass_context
 def derotate(ctx: click.Context, /, **options: Any) -> None:
@@ -76,14 +64,14 @@ def derotate(ctx: click.Context, /, **options: Any) -> None:
 
 
 @command(fields=DisparityOptions)
-@pair_input_options
-@pair_options
-@topic_options
-@output_folder_option
-@save_as_option
+@shared.pair_input_options
+@shared.pair_options
+@shared.topic_options
+@shared.output_folder_option
+@shared.save_as_option
 @option("--preview", DIR, section="Output")
-@stereo_options
-@cluster_options
+@shared.stereo_options
+@shared.cluster_options
 @config_option
 @click.pass_context
 def disparity(ctx: click.Context, /, **options: Any) -> None:
@@ -116,12 +104,12 @@ count_options = section(
 
 
 @command(fields=VDisparityOptions)
-@input_options
+@shared.input_options
 @count_options
-@output_folder_option
-@encoding_options
-@calibration_options
-@cluster_options
+@shared.output_folder_option
+@shared.encoding_options
+@shared.calibration_options
+@shared.cluster_options
 @config_option
 @click.pass_context
 def vdisparity(ctx: click.Context, /, **options: Any) -> None:
@@ -148,16 +136,16 @@ def vdisparity(ctx: click.Context, /, **options: Any) -> None:
 
 
 @command(fields=HeightsOptions)
-@input_options
+@shared.input_options
 @option("--from", RESULT, required=True, section="Road")
 @option("--skip-suspect", FLAG, section="Road")
-@output_folder_option
+@shared.output_folder_option
 @option("--preview", DIR, section="Output")
-@heights_range_option
+@shared.heights_range_option
 @option("--save-as", Choice("tiff", "npy"), section="Output")
-@encoding_options
-@calibration_options
-@cluster_options
+@shared.encoding_options
+@shared.calibration_options
+@shared.cluster_options
 @config_option
 @click.pass_context
 def heights(ctx: click.Context, /, **options: Any) -> None:

@@ -4,8 +4,8 @@ from typing import Any
 
 import click
 
+from rollcli.cli import options as shared
 from rollcli.cli.command import command, config_option, option
-from rollcli.cli.options import running_options
 from rollcli.cli.types import DIR, FLAG, PATH, Number, OutputFile, Text
 from rollcli.errors import ExitStatus
 from rollcli.report.options import ReportOptions
@@ -27,7 +27,7 @@ from rollcli.report.options import ReportOptions
 @option("--svg", DIR, section="Charts for slides")
 @option("--pdf", DIR, section="Charts for slides")
 @option("--png", DIR, section="Charts for slides")
-@running_options
+@shared.running_options
 @config_option
 @click.pass_context
 def report(ctx: click.Context, /, **options: Any) -> None:

@@ -4,8 +4,8 @@ from typing import Any
 
 import click
 
+from rollcli.cli import options as shared
 from rollcli.cli.command import command, config_option, option, record
-from rollcli.cli.options import calibration_options, running_options
 from rollcli.cli.types import FILE, FLAG, PATH, TABLE_FILE, TABLE_FORMATS, Choice, Number, Text, table_format
 from rollcli.errors import ExitStatus
 from rollcli.run.options import GateOptions, RigOptions
@@ -41,9 +41,9 @@ gate_options = record(
 @option("-o, --output", TABLE_FILE, section="Assessment")
 @option("--format", Choice(*TABLE_FORMATS), default=None, section="Assessment")
 @option("--correction", FILE, section="Assessment")
-@calibration_options
+@shared.calibration_options
 @gate_options
-@running_options
+@shared.running_options
 @config_option
 @click.pass_context
 def rig(ctx: click.Context, /, **options: Any) -> None:

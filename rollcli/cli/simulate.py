@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import click
 
+from rollcli.cli import options as shared
 from rollcli.cli.command import command, config_option, option, record
 from rollcli.cli.estimate import one_start, resume_command
-from rollcli.cli.options import running_options
 from rollcli.cli.types import DIR, FLAG, IMAGE_SIZE, POINT, Choice, Number, span
 from rollcli.run.options import RunningOptions
 from rollcli.simulate.options import (
@@ -74,7 +74,7 @@ simulate_options = record(
 @command()
 @click.argument("folder", type=DIR, metavar="DIR")
 @simulate_options
-@running_options
+@shared.running_options
 @config_option
 @click.pass_context
 def simulate(ctx: click.Context, /, folder: str, options: SimulateOptions, running: RunningOptions) -> None:
