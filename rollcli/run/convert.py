@@ -10,6 +10,7 @@ from rollcli.extras import require_extra
 from rollcli.files.atomic import remove_leftovers
 from rollcli.files.results import Row
 from rollcli.messages import say
+from rollcli.run import outputs
 from rollcli.run.find import Named, check_depth, check_first_size, map_frames, pair_frames
 from rollcli.run.frame import Frame, FrameResult, failed_frame
 from rollcli.run.options import (
@@ -20,14 +21,6 @@ from rollcli.run.options import (
     HeightsOptions,
     InputOptions,
     VDisparityOptions,
-)
-from rollcli.run.outputs import (
-    check_one_owner,
-    check_places,
-    check_writes,
-    list_files,
-    paths_of,
-    write_outputs,
 )
 from rollcli.run.plan import decoder_for, workers_for
 from rollcli.run.progress import Progress
@@ -48,7 +41,7 @@ def run_conversion(options: ConvertOptions) -> ExitStatus:
     running = options.running
     frames = _plan(options)
     if running.dry_run:
-        list_files((each.reads(), paths_of(each, options)) for each in frames)
+        outputs.list_files((each.reads(), outputs.paths_of(each, options)) for each in frames)
         return ExitStatus.DONE
     require_scheduler(running.scheduler)
     _remove_leftovers(frames, options)
@@ -87,11 +80,11 @@ def _plan(options: ConvertOptions) -> list[Frame]:
         for frame, row in zip(frames, rows, strict=True)
         if row is None or row.status != "suspect" or not options.skip_suspect
     ]
-    check_one_owner((each, paths_of(each, options)) for each in wanted)
-    check_places(wanted, [options.output])
-    check_writes(
+    outputs.check_one_owner((each, outputs.paths_of(each, options)) for each in wanted)
+    outputs.check_places(wanted, [options.output])
+    outputs.check_writes(
         [path for each in wanted for path in each.reads()],
-        [path for each in wanted for path in paths_of(each, options)],
+        [path for each in wanted for path in outputs.paths_of(each, options)],
         overwrite=options.running.overwrite,
     )
     return wanted
@@ -141,7 +134,7 @@ def _find_rows(frames: Sequence[Frame], options: ConvertOptions) -> Sequence[Row
 
 
 def _remove_leftovers(frames: Sequence[Frame], options: ConvertOptions) -> None:
-    remove_leftovers(path for frame in frames for path in paths_of(frame, options))
+    remove_leftovers(path for frame in frames for path in outputs.paths_of(frame, options))
 
 
 def _convert(frame: Frame, options: ConvertOptions, read: FrameOptions) -> FrameResult:
@@ -151,5 +144,5 @@ def _convert(frame: Frame, options: ConvertOptions, read: FrameOptions) -> Frame
 
 
 def _lost(frame: Frame, reason: str, options: ConvertOptions) -> FrameResult:
-    write_outputs({}, paths_of(frame, options), replaces=options.running.overwrite)
+    outputs.write_outputs({}, outputs.paths_of(frame, options), replaces=options.running.overwrite)
     return failed_frame(frame, reason)

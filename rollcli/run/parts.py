@@ -12,18 +12,9 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from rollcli.errors import InputError, UsageError
 from rollcli.extras import require_extra
+from rollcli.files import results
 from rollcli.files.atomic import is_folder, is_there, remove_leftovers, sync_files
 from rollcli.files.locking import locked_folder, not_resumable
-from rollcli.files.results import (
-    Row,
-    format_header,
-    format_row,
-    parse_rows,
-    part_name,
-    part_names,
-    read_parts,
-    run_path,
-)
 from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url, located, public_name
 from rollcli.run.batch import Batch, Parts, Step, line_form, part_location
@@ -98,7 +89,7 @@ class PartsOutput(RecordedOutput):
 
     def _write_anew(self, number: int) -> None:
         form = line_form(self._plan.format)
-        old = [format_row(row, form, self._plan.further) for row in _rows_of_part(self._plan, number)]
+        old = [results.format_row(row, form, self._plan.further) for row in _rows_of_part(self._plan, number)]
         path = part_inputs_path(self._plan.output, number)
         inputs = read_bytes(path)
         both = enumerate(zip(old, split_lines(inputs), strict=True), number * self._part_rows)
@@ -179,7 +170,9 @@ def _remove_leftovers(plan: Plan, parts: Sequence[str] = ()) -> None:
     if not is_url(plan.output):
         every = range(_whole_parts(len(plan.frames), plan.options.result.part_rows))
         to_write = [path for number in every for path in _part_paths(plan, number)]
-        remove_leftovers([run_path(plan.output), *to_write, *(f"{plan.output}/{name}" for name in parts)])
+        remove_leftovers(
+            [results.run_path(plan.output), *to_write, *(f"{plan.output}/{name}" for name in parts)]
+        )
 
 
 def check_parts(plan: Plan) -> list[str]:
@@ -194,7 +187,7 @@ def check_parts(plan: Plan) -> list[str]:
         if is_there(path) and not is_folder(path):
             raise UsageError(f"{path}: is a file; a result of parts is a folder, give another --output")
     resume, overwrite = plan.options.result.resume, plan.options.running.overwrite
-    parts = part_names(list_names(plan.output))
+    parts = results.part_names(list_names(plan.output))
     if parts and not (resume or overwrite):
         raise UsageError(
             f"{plan.output}: exists already; give --resume to continue it or --overwrite to replace it"
@@ -222,12 +215,12 @@ def _kept(plan: Plan, parts: list[str]) -> tuple[KeptRows, dict[str, bytes]]:
     rows, numbered = plan.options.result.part_rows, dict[str, int]()
     for name in parts:
         number = int(name.removeprefix("part-").partition(".")[0])
-        if name == part_name(number, plan.format):  # no run names a part otherwise
+        if name == results.part_name(number, plan.format):  # no run names a part otherwise
             numbered[name] = number
-    header = b"" if 0 in numbered.values() else format_header(plan.format, plan.further)
+    header = b"" if 0 in numbered.values() else results.format_header(plan.format, plan.further)
     try:
-        for name, data in read_parts(plan.output, numbered, header):
-            found, first = tuple(parse_rows(data, name)), rows * numbered[base_name(name)]
+        for name, data in results.read_parts(plan.output, numbered, header):
+            found, first = tuple(results.parse_rows(data, name)), rows * numbered[base_name(name)]
             if len(found) < rows and first + len(found) != len(plan.frames):
                 continue
             kept.skip_to(first)
@@ -243,11 +236,11 @@ def _kept(plan: Plan, parts: list[str]) -> tuple[KeptRows, dict[str, bytes]]:
     return kept, renewed
 
 
-def _rows_of_part(plan: Plan, number: int) -> tuple[Row, ...]:
+def _rows_of_part(plan: Plan, number: int) -> tuple[results.Row, ...]:
     """Read a part again; the first one has the header of CSV."""
-    header = format_header(plan.format, plan.further) if number else b""
-    ((name, data),) = read_parts(plan.output, [base_name(_location(plan, number))], header)
-    return tuple(parse_rows(data, name))
+    header = results.format_header(plan.format, plan.further) if number else b""
+    ((name, data),) = results.read_parts(plan.output, [base_name(_location(plan, number))], header)
+    return tuple(results.parse_rows(data, name))
 
 
 def _whole_parts(rows: int, part_rows: int) -> int:

@@ -10,17 +10,10 @@ from rollcli.files.containers import file_of
 from rollcli.files.results import IMAGE_ROLL, TIMING, Format, require_utf8, run_path
 from rollcli.files.stores.locations import is_url, tasks_in_hand
 from rollcli.files.stream import is_stream
+from rollcli.run import outputs
 from rollcli.run.find import Named, calibration_files, check_depth, check_first_size, map_frames, pair_frames
 from rollcli.run.frame import Frame
 from rollcli.run.options import EstimateOptions, FrameOptions, ResultOptions, RunningOptions
-from rollcli.run.outputs import (
-    check_inputs_are_kept,
-    check_nothing_is_there,
-    check_one_owner,
-    check_places,
-    every_path,
-    images_of,
-)
 from rollcli.run.result_file import inputs_path
 from rollcli.run.workers.chunks import Workers
 
@@ -77,19 +70,21 @@ def make_plan(options: EstimateOptions) -> Plan:
             "--update takes a result in one file of CSV or JSON Lines"
         )
     if options.images.folders():
-        check_one_owner(((frame, every_path(frame, options.images)) for frame in frames), plan.files)
+        outputs.check_one_owner(
+            ((frame, outputs.every_path(frame, options.images)) for frame in frames), plan.files
+        )
     calibrations = calibration_files(options.calibration)
-    check_inputs_are_kept(
+    outputs.check_inputs_are_kept(
         lambda: chain(calibrations, (path for frame in plan.frames for path in frame.reads())),
-        chain(plan.files, images_of(plan.frames, options.images)),
+        chain(plan.files, outputs.images_of(plan.frames, options.images)),
     )
     further = further_columns(frames, options)
     frames = _shard(frames, options.result)
-    check_places(frames, [folder for _, folder in options.images.folders()])
+    outputs.check_places(frames, [folder for _, folder in options.images.folders()])
     checked = options.calibration.given or options.pairs.side_by_side is not None
     notes = check_first_size(frames, options.frame) if checked else []
     if not (options.running.overwrite or options.result.resume):
-        check_nothing_is_there(images_of(frames, options.images))
+        outputs.check_nothing_is_there(outputs.images_of(frames, options.images))
     if plan.format == "parquet" and is_stream(plan.output):
         raise UsageError("Parquet is a folder of parts: name it with --output")
     if plan.format == "parquet" and not options.inputs.sorted:  # those are read as they are needed

@@ -17,20 +17,12 @@ from typing import Any, TypeVar, get_args
 
 from rollcli import __version__
 from rollcli.errors import InputError, OutputError
+from rollcli.files import results
 from rollcli.files.locking import differences, not_resumable
-from rollcli.files.results import (
-    IMAGE_ROLL,
-    Row,
-    columns,
-    format_header,
-    format_row,
-    parse_rows,
-    read_run,
-    run_path,
-)
 from rollcli.files.storage import write_bytes
 from rollcli.files.stores.locations import base_name, public_name
 from rollcli.rig.calibration import Calibration
+from rollcli.run import outputs
 from rollcli.run.batch import Batch, check_owned
 from rollcli.run.frame import Frame, ReadAs
 from rollcli.run.options import (
@@ -40,14 +32,6 @@ from rollcli.run.options import (
     Layout,
     MethodOptions,
     RegionOptions,
-)
-from rollcli.run.outputs import (
-    Existing,
-    check_nothing_is_there,
-    images_of,
-    local_images,
-    possible_paths,
-    remove_marks,
 )
 from rollcli.run.plan import Plan
 from rollcli.run.progress import RunSummary
@@ -140,7 +124,7 @@ class RunRecord:
             **({_REPLACES: True} if self.replaces and not summary else {}),
         }
         data = json.dumps(record, indent=2).encode() + b"\n"
-        write_bytes(run_path(self.plan.output), data, durable=True, owner=self.run)
+        write_bytes(results.run_path(self.plan.output), data, durable=True, owner=self.run)
         self._begun = True
 
 
@@ -285,7 +269,7 @@ class KeptRows:
         Which row is the first that is not of the frame in its place; empty where there is none.
     """
 
-    def __init__(self, plan: Plan, rows: Iterable[Row] = (), inputs: Inputs | None = None) -> None:
+    def __init__(self, plan: Plan, rows: Iterable[results.Row] = (), inputs: Inputs | None = None) -> None:
         self.count, self.gone = 0, 0
         self.changed: list[str] = []
         self.holes: list[int] = []
@@ -297,7 +281,7 @@ class KeptRows:
         self._frames, self._images = plan.frames, plan.options.images
         self._following = iter(plan.frames)
         self._retries = plan.options.result.retry_failed
-        self._made = Existing(filled=True)
+        self._made = outputs.Existing(filled=True)
         self.inputs = inputs
         for row in rows:
             if not self.add(row):
@@ -313,7 +297,7 @@ class KeptRows:
             self._frames[position] for position in range(first, len(self._frames)) if position not in failed
         )
 
-    def add(self, row: Row) -> bool:
+    def add(self, row: results.Row) -> bool:
         """Take in the next row; one that does not count is left out, and so are those behind it."""
         is_again = row.message == _NOT_YET or (row.status == "error" and self._retries)
         if (frame := next(self._following, None)) is not None:
@@ -328,7 +312,7 @@ class KeptRows:
                     self.changed.append(frame.file)
                     is_again = True
             if row.status != "error" and not is_again:
-                images = possible_paths(frame, self._images)
+                images = outputs.possible_paths(frame, self._images)
                 if not all(any(path in self._made for path in paths) for _, paths in images):
                     self.incomplete.append(frame)
         if row.status == "error":
@@ -378,7 +362,7 @@ def arranged(data: bytes, plan: Plan) -> tuple[bytes, int]:
     lines = row_lines(io.BytesIO(data), plan.format)
     header = next(lines) if plan.format == "csv" else b""
     places, ends, end = dict[int, int](), [len(header)], len(header)
-    for row, line in zip(parse_rows(data, plan.output), lines, strict=False):
+    for row, line in zip(results.parse_rows(data, plan.output), lines, strict=False):
         places[hash((row.file, row.right_file))] = len(ends) - 1
         end += len(line)
         ends.append(end)
@@ -386,8 +370,8 @@ def arranged(data: bytes, plan: Plan) -> tuple[bytes, int]:
     for frame in plan.frames:
         place = places.pop(hash((frame.file, frame.right_file)), None)
         if place is None:
-            row = Row(frame.file, frame.right_file, "error", message=_NOT_YET)
-            waiting.append(format_row(row, plan.format, plan.further))
+            row = results.Row(frame.file, frame.right_file, "error", message=_NOT_YET)
+            waiting.append(results.format_row(row, plan.format, plan.further))
         else:
             pieces += [*waiting, data[ends[place] : ends[place + 1]]]
             waiting.clear()
@@ -397,13 +381,13 @@ def arranged(data: bytes, plan: Plan) -> tuple[bytes, int]:
 def _with_columns(data: bytes, plan: Plan) -> bytes:
     """Return a result with the columns of this run: fx and fy of a calibration may have come to differ."""
     first, further = data.partition(b"\n")[0], plan.further
-    others = further[1:] if IMAGE_ROLL in further else (IMAGE_ROLL, *further)
+    others = further[1:] if results.IMAGE_ROLL in further else (results.IMAGE_ROLL, *further)
     names = first.decode().split(",") if plan.format == "csv" else list(json.loads(first))
-    if names != list(columns(others)):
+    if names != list(results.columns(others)):
         return data
-    rows = (replace(row, image_roll_deg=row.map_roll_deg) for row in parse_rows(data, plan.output))
-    return format_header(plan.format, further) + b"".join(
-        format_row(row, plan.format, further) for row in rows
+    rows = (replace(row, image_roll_deg=row.map_roll_deg) for row in results.parse_rows(data, plan.output))
+    return results.format_header(plan.format, further) + b"".join(
+        results.format_row(row, plan.format, further) for row in rows
     )
 
 
@@ -445,7 +429,7 @@ class RecordedOutput(ABC):
         self._take_images(frames, batch.figures.status)
 
     def _take_images(self, frames: Sequence[Frame], status: bytes) -> None:
-        self._keep_images(local_images(frames, status, self._plan.options.images))
+        self._keep_images(outputs.local_images(frames, status, self._plan.options.images))
 
     @abstractmethod
     def _keep_images(self, images: Iterable[str]) -> None:
@@ -453,7 +437,7 @@ class RecordedOutput(ABC):
 
     def _end_replacing(self) -> None:
         """Forget the rows that are written, and what told their images from those of other programs."""
-        remove_marks([self._plan.frames[at] for at in self._replacing], self._plan.options.images)
+        outputs.remove_marks([self._plan.frames[at] for at in self._replacing], self._plan.options.images)
         self._replacing.clear()
 
 
@@ -469,14 +453,14 @@ def new_record(plan: Plan, kept: KeptRows) -> RunRecord:
     if not (kept.count or plan.options.result.resume):
         return record
     try:
-        earlier = read_run(plan.output)
+        earlier = results.read_run(plan.output)
         found = next(_differences(kept, earlier, record), "")
     except InputError as error:
         found = str(error)
     if found and kept.count:
         raise not_resumable(plan.output, found)
-    if found:
-        check_nothing_is_there(images_of(plan.frames, plan.options.images))  # those of another run
+    if found:  # what is there is of another run
+        outputs.check_nothing_is_there(outputs.images_of(plan.frames, plan.options.images))
     elif earlier is not None:
         record.continue_from(earlier)
     return record
@@ -486,10 +470,10 @@ def _differences(kept: KeptRows, was: Mapping[str, Any] | None, record: RunRecor
     """Yield what keeps a run with this record from being continued by another one, in words."""
     plan, now = record.plan, record.fixed
     if was is None:
-        yield f"there is no {base_name(run_path(plan.output))}"
+        yield f"there is no {base_name(results.run_path(plan.output))}"
         return
     if not _is_whole(was):
-        yield f"{base_name(run_path(plan.output))} is damaged"
+        yield f"{base_name(results.run_path(plan.output))} is damaged"
         return
     yield from differences(was, now)
     if plan.options.result.update:

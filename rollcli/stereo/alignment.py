@@ -9,15 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rollcli.stereo import row_fit
 from rollcli.stereo.misalignment import LEVEL, ColumnSupport, Misalignment
-from rollcli.stereo.row_fit import (
-    ColumnEvidence,
-    MeasuredRows,
-    SeenBlocks,
-    column_evidence,
-    column_support,
-    fit_rows,
-)
 from rollcli.stereo.views import (
     BLOCK,
     Map,
@@ -76,17 +69,17 @@ class Measured:
     errors: Misalignment
     share: float
     spread: float
-    rows: MeasuredRows
+    rows: row_fit.MeasuredRows
 
     @property
-    def evidence(self) -> ColumnEvidence:
+    def evidence(self) -> row_fit.ColumnEvidence:
         """What the rows say of the columns; worked out when it is asked for: most measurements need none."""
-        return column_evidence(self.rows, self.spread)
+        return row_fit.column_evidence(self.rows, self.spread)
 
     @cached_property
     def support(self) -> ColumnSupport:
         """What of it is believed to be in the columns, too."""
-        return column_support(self.evidence)
+        return row_fit.column_support(self.evidence)
 
     def resized(self, factor: float) -> "Measured":
         """Return this measurement, of views `factor` times as large."""
@@ -153,7 +146,7 @@ def measure_misalignment(
         seen = blocks.vertical(found)
         if len(seen.shift) < _FEWEST:
             return None
-        last = fit = fit_rows(seen, found, last)
+        last = fit = row_fit.fit_rows(seen, found, last)
         reach = fit.lies.reach(*disparity.shape)
         step = fit.lies.times(_LONGEST_STEP / max(reach, _LONGEST_STEP))
         before, found = found, (found + step).rounded(*disparity.shape)
@@ -163,7 +156,7 @@ def measure_misalignment(
         if reach < enough or is_level(found.times(_HIDDEN), fit.errors, disparity.shape):
             break
     height, width = disparity.shape
-    rows = MeasuredRows(seen, before, (height, width))
+    rows = row_fit.MeasuredRows(seen, before, (height, width))
     return Measured(found, fit.errors, len(seen.shift) / blocks.count, fit.spread, rows)
 
 
@@ -244,13 +237,13 @@ class _Blocks:
         self._shares = _Shares.of(self._across, self._down, self._seen, self._u - self._centre_x, self._y)
         self._along = np.zeros(len(self._u), np.float32)
 
-    def vertical(self, at: Misalignment) -> SeenBlocks:
+    def vertical(self, at: Misalignment) -> row_fit.SeenBlocks:
         """Return the vertical disparities that are left when the right view is levelled by `at`."""
         x, y = self._u - self._centre_x, self._y
         height, width = self._shape
         u, v = seen_at(at, self._u, self._v, self._shape, self._near[:, None])
         if not len(u):
-            return SeenBlocks(*(x[:, 0],) * 5)
+            return row_fit.SeenBlocks(*(x[:, 0],) * 5)
         read_u, read_v, grey = grey_between(self._right, u, v)
         off = self._left - grey
         # else steps of less than a 64th of a pixel are none, or one, and measuring does not settle
@@ -264,7 +257,7 @@ class _Blocks:
         shift[cut] = np.einsum("ij,ij->i", part.share, off[cut])
         weight[cut], mean_x[cut], mean_y[cut] = part[3:]
         telling = weight > 0
-        return SeenBlocks(
+        return row_fit.SeenBlocks(
             mean_x[telling], mean_y[telling], self._near[telling], shift[telling], weight[telling]
         )
 
