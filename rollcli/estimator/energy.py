@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.moments import Floats, Grid, Moments, to_powers_of_sum
+from rollcli.estimator.road.model import Parabola
 
 # x^i y^j of the rotated frame that the energy and its two derivatives need, as (i, j)
 _OF_WEIGHTS = ((2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3), (2, 2), (1, 3), (0, 4))
@@ -181,7 +182,7 @@ class Energy:
         moved = slope * slope * xx + 2 * slope * bend * xxy + bend * bend * xxyy
         return Terms(value, gradient, 2 * (moved - saved - bend * res_xx))
 
-    def parabola(self, theta: float) -> tuple[float, float, float]:
+    def parabola(self, theta: float) -> Parabola:
         """Return (a0, a1, a2) of the road d = a0 + a1 y + a2 y^2 at `theta`, in pixels.
 
         y = v cos(theta) - u sin(theta) is measured from the centre of the top-left pixel.

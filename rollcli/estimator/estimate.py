@@ -11,6 +11,7 @@ from rollcli.estimator.doubts import doubts_of
 from rollcli.estimator.interval import Tangent, interval_of, jackknife, touch
 from rollcli.estimator.moments import CheckedMap, Grid
 from rollcli.estimator.request import AREAS, DEFAULT_REQUEST, Request
+from rollcli.estimator.road.model import Parabola
 from rollcli.estimator.road.pixels import PixelSet, load_solver, select_pixels
 from rollcli.estimator.solvers.exact import CertifiedSolution, certify
 
@@ -67,7 +68,7 @@ class RollEstimate:
     converged: bool
     global_minimum: bool | None
     rmse: float
-    alpha: tuple[float, float, float]
+    alpha: Parabola
     valid_fraction: float
     road_fraction: float
     width: int

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rollcli.estimator.least_squares import regular, solve_normal, unit
 from rollcli.estimator.moments import Floats, Grid
-from rollcli.estimator.road.model import Reals, RoadModel
+from rollcli.estimator.road.model import Parabola, Reals, RoadModel
 from rollcli.estimator.road.surface import Surface
 from rollcli.estimator.tuning import IntervalTuning
 
@@ -334,11 +334,7 @@ class Tangent:
 
 
 def touch(
-    alpha: tuple[float, float, float],
-    theta: float,
-    grid: Grid,
-    surface: Surface | None,
-    jackknife: Jackknife | None,
+    alpha: Parabola, theta: float, grid: Grid, surface: Surface | None, jackknife: Jackknife | None
 ) -> Tangent:
     """Take the tangent of a road's parabola at the mean row of its pixels.
 

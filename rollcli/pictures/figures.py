@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from rollcli.estimator.road.model import Parabola
 from rollcli.pictures.colours import LIGHT
 from rollcli.pictures.derotate import derotate
 from rollcli.pictures.overlay import brightest
@@ -101,7 +102,7 @@ _COLOURS, _ROAD = "inferno", "#00e5ff"  # the road in a colour that those of the
 def v_disparity_figure(
     disparity: NDArray[Any],
     theta: float,
-    alpha: tuple[float, float, float] | None,
+    alpha: Parabola | None,
     kind: str,
     *,
     bins: int | None = None,
@@ -129,7 +130,7 @@ def v_disparity_figure(
     height, width = disparity.shape
     maps = (disparity, derotate(disparity, theta))
     titles = ("as it is", "de-rotated by " + f"{math.degrees(theta):.2f}°".replace("-", "−"))
-    curves: list[tuple[float, float, float] | None] = [None, None]
+    curves: list[Parabola | None] = [None, None]
     if alpha is not None:
         start = row_offset(theta, width, height)
         a0, a1, a2 = alpha
@@ -165,9 +166,7 @@ def _draw_map(axes: Axes, disparity: NDArray[Any], title: str) -> Any:
     )
 
 
-def _draw_counts(
-    axes: Axes, histogram: VDisparity, curve: tuple[float, float, float] | None, height: int
-) -> None:
+def _draw_counts(axes: Axes, histogram: VDisparity, curve: Parabola | None, height: int) -> None:
     counts, end = shown_counts(histogram, _COLUMNS)
     edges = (0.0, end, height - 0.5, -0.5)
     axes.imshow(np.log1p(counts), cmap=_COLOURS, extent=edges, interpolation="none", aspect="auto")

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
 from rollcli.estimator.moments import map_of, strips
+from rollcli.estimator.road.model import Parabola
 from rollcli.pictures.overlay import Pixels, round_step
 
 _MAX_BINS = 1024
@@ -98,7 +99,7 @@ def row_offset(theta: float, width: int, height: int) -> float:
     return v * math.cos(theta) - u * math.sin(theta) - v
 
 
-def profile(alpha: tuple[float, float, float], theta: float, width: int) -> tuple[float, float, float]:
+def profile(alpha: Parabola, theta: float, width: int) -> Parabola:
     """Return the road's disparity along the middle column of a map, as a parabola of the row.
 
     Parameters
@@ -141,10 +142,7 @@ _FONT, _SIZE = cv2.FONT_HERSHEY_SIMPLEX, 0.36
 
 
 def draw_v_disparity(
-    histogram: VDisparity,
-    alpha: tuple[float, float, float] | None = None,
-    offset: float = 0.0,
-    horizon: float | None = None,
+    histogram: VDisparity, alpha: Parabola | None = None, offset: float = 0.0, horizon: float | None = None
 ) -> Pixels:
     """Draw counts: log scale, bright where many, with the road's parabola and the horizon over them.
 

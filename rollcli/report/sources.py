@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from rollcli.errors import UsageError
+from rollcli.estimator.road.model import Parabola
 from rollcli.files.atomic import is_file, is_folder
 from rollcli.files.containers import frame_name
 from rollcli.files.naming import listed
@@ -88,7 +89,7 @@ class Subject:
 
     frame: Frame
     theta: float
-    alpha: tuple[float, float, float] | None
+    alpha: Parabola | None
     images: dict[str, str]
     row: Row
     options: FrameOptions

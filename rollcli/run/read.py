@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError, InputError, UsageError, raised_at
 from rollcli.estimator.request import Request
-from rollcli.estimator.road.find import road_plane
+from rollcli.estimator.road.find import Plane, road_plane
 from rollcli.files.codecs.pictures import views_of
 from rollcli.files.encodings import Encoding, to_disparity
 from rollcli.files.formats import Stored, decode_mask, read_image, read_stored
@@ -265,9 +265,7 @@ def wanted_of(allowed: NDArray[np.bool_] | None, request: Request, *, whole: boo
     return Wanted(road=partial(_road, allowed, request) if request.road == "auto" else None, whole=whole)
 
 
-def _road(
-    allowed: NDArray[np.bool_] | None, request: Request, small: NDArray[Any]
-) -> tuple[float, float, float] | None:
+def _road(allowed: NDArray[np.bool_] | None, request: Request, small: NDArray[Any]) -> Plane | None:
     """Return the plane of the road that a small map shows in the region."""
     if allowed is not None:
         v, u = (np.arange(few) * many // few for few, many in zip(small.shape, allowed.shape, strict=True))

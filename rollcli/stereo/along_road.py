@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rollcli.estimator.road.find import Plane
 from rollcli.stereo.alignment import level, seen_from_right
 from rollcli.stereo.misalignment import Misalignment
 from rollcli.stereo.options import StereoOptions
@@ -29,9 +30,6 @@ from rollcli.stereo.views import (
     shrink_both,
     smoothed_at_pixels,
 )
-
-Plane = tuple[float, float, float]
-"""Disparity at pixel (0, 0), px, and what a pixel to the right and one further down add, of a map."""
 
 FindRoad = Callable[[Map], Plane | None]
 """Finds the road's plane in a small map; None where there is none."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 from rollcli.estimator.request import MAX_ROLL_DEG
-from rollcli.estimator.road.find import road_plane
+from rollcli.estimator.road.find import Plane, road_plane
 from rollcli.stereo.alignment import (
     Approach,
     Measured,
@@ -22,7 +22,7 @@ from rollcli.stereo.alignment import (
     level,
     textured_share,
 )
-from rollcli.stereo.along_road import FindRoad, Levelled, Plane, Search, match_for_road
+from rollcli.stereo.along_road import FindRoad, Levelled, Search, match_for_road
 from rollcli.stereo.first_look import FirstLook, first_look, look_for_range
 from rollcli.stereo.misalignment import LEVEL, NOTHING_KNOWN, ColumnSupport, Misalignment
 from rollcli.stereo.options import StereoOptions as StereoOptions

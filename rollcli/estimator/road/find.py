@@ -22,6 +22,8 @@ from rollcli.estimator.road.model import RoadModel
 from rollcli.estimator.road.sample import Sample, every, quantile, take_sample, values_at
 from rollcli.estimator.tuning import TUNING, SearchTuning, Tuning
 
+Plane = tuple[float, float, float]
+"""Disparity at pixel (0, 0), px, and what a pixel to the right and one further down add, of a map."""
 HARDLY_A_PIXEL = "no road: hardly a pixel lies on the best plane that was found"
 _SPARSE = 0.1  # of the pixels have neighbours at most, where these are too few to tell a road
 _FITS = 2  # of each plane that is judged again
@@ -239,13 +241,9 @@ def _rolls(planes: Singles) -> Singles:
 
 
 def road_plane(
-    disparity: NDArray[Any],
-    usable: NDArray[np.bool_] | None,
-    max_roll: float,
-    seed: int,
-    tuning: Tuning = TUNING,
-) -> tuple[float, float, float] | None:
-    """Return the plane of the road in a small map.
+    disparity: NDArray[Any], usable: NDArray[np.bool_] | None, max_roll: float, seed: int
+) -> Plane | None:
+    """Return the plane of the road in a small map; None where no road is found.
 
     Parameters
     ----------
@@ -255,17 +253,10 @@ def road_plane(
         Its pixels that may be used, where not all may.
     max_roll, seed
         See `find_road`.
-    tuning : Tuning
-
-    Returns
-    -------
-    tuple of float, or None
-        Disparity at pixel (0, 0), px, and what a pixel to the right and one further down add; None where no
-        road is found.
     """
     try:
-        sample = take_sample(disparity, usable, tuning.sample)
-        c0, c1, c2 = find_road(sample, max_roll, seed, tuning).plane.tolist()
+        sample = take_sample(disparity, usable, TUNING.sample)
+        c0, c1, c2 = find_road(sample, max_roll, seed, TUNING).plane.tolist()
     except EstimationError:
         return None
     grid = sample.grid

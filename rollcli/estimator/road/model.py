@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 Reals = NDArray[np.floating[Any]]
 Coordinate = TypeVar("Coordinate", float, Reals)
-
+Parabola = tuple[float, float, float]
+"""(a0, a1, a2) of d = a0 + a1 y + a2 y^2."""
 
 _HARDLY = 1e-9  # of the slope: a disparity that is none, by which squares can be divided
 FARTHEST_SIDE = 4.0  # camera heights to the side; camber is not extrapolated beyond
@@ -34,19 +35,13 @@ class RoadModel(NamedTuple):
     """
 
     theta: float
-    alpha: tuple[float, float, float]
+    alpha: Parabola
     camber: float = 0.0
 
     @classmethod
     def of_plane(cls, c0: float, c1: float, c2: float) -> "RoadModel":
         """Return the road that is the plane d = c0 + c1 x + c2 y."""
         return cls(math.atan2(-c1, c2), (c0, math.hypot(c1, c2), 0.0))
-
-    @property
-    def plane(self) -> tuple[float, float, float]:
-        """The road without its curvatures, as the plane d = c0 + c1 x + c2 y."""
-        level, slope, _ = self.alpha
-        return level, -slope * math.sin(self.theta), slope * math.cos(self.theta)
 
     def across(self, x: Coordinate, y: Coordinate) -> Coordinate:
         """Return the coordinate across the road, x cos(theta) + y sin(theta)."""

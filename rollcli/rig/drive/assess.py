@@ -56,10 +56,7 @@ def _stamp(file: str) -> int | None:
 
 
 def split_drives(
-    files: Sequence[str],
-    groups: str = AUTO,
-    kinds: Sequence[str] = (),
-    rolls: NDArray[np.float64] | None = None,
+    files: Sequence[str], groups: str = AUTO, kinds: Sequence[str] = (), rolls: Floats | None = None
 ) -> list[tuple[str, NDArray[np.intp]]]:
     """Group frames into drives.
 
