@@ -249,26 +249,19 @@ def alignment(rows: Sequence[Row], rig: RigAssessment) -> Chart:
     axis = frame_axis(rows, rig)
     for place, (quantity, (words, colour)) in enumerate(zip(ALIGNMENT, _PARTS, strict=True)):
         known = [
-            (number, row, float(getattr(row, quantity.column)))
+            (axis.at(number), row, float(value), _shift_of(place, row))
             for number, row in enumerate(rows, 1)
-            if getattr(row, quantity.column) is not None and row.height and row.width
+            if (value := getattr(row, quantity.column)) is not None and row.height and row.width
         ]
-        scale = [_shift_of(place, row) for _, row, _ in known]
-        shifts = [(row, value, value * each) for (_, row, value), each in zip(known, scale, strict=True)]
-        dots = scatter(
-            words,
-            "markers",
-            [axis.at(number) for number, _, _ in known],
-            [round(shift, 3) for _, _, shift in shifts],
-            customdata=[
-                label(row, f"{value:+.3f}{quantity.unit}: {shift:+.2f} px") for row, value, shift in shifts
-            ],
-            hovertemplate=_SAID,
-            marker={"color": colour, "size": 5 if len(rows) <= _MANY else 2.5},
-        )
-        data.append(dots)
-        if scale:
-            factor, line = float(np.median(scale)), {"color": colour, "width": 2}
+        x, y = [at for at, *_ in known], [round(value * each, 3) for _, _, value, each in known]
+        said = [
+            label(row, f"{value:+.3f}{quantity.unit}: {value * each:+.2f} px")
+            for _, row, value, each in known
+        ]
+        dots = {"color": colour, "size": 5 if len(rows) <= _MANY else 2.5}
+        data.append(scatter(words, "markers", x, y, customdata=said, hovertemplate=_SAID, marker=dots))
+        if known:
+            factor, line = float(np.median([each for *_, each in known])), {"color": colour, "width": 2}
             look = {"name": f"{words}, over the drive", "showlegend": False, "line": line}
             data += [
                 {**trace, **look, "y": [each if each is None else factor * each for each in trace["y"]]}
