@@ -174,38 +174,29 @@ def _require(holds: bool) -> None:
         raise ValueError
 
 
-def _parts(value: Any, separators: str) -> list[Any]:
-    return list(value) if isinstance(value, list | tuple) else re.split(f"[{separators}]", str(value))
+def _numbers(
+    separators: str, holds: Callable[..., bool], *, whole: bool = False
+) -> Callable[[Any], tuple[Any, ...]]:
+    """Return what takes as many numbers between separators as `holds` does, if that holds of them.
 
+    Whole ones have at most nine digits, and no sign; others are finite.
+    """
 
-def _numbers(value: Any, separator: str) -> tuple[float, ...]:
-    numbers = tuple(map(float, _parts(value, separator)))
-    _require(all(map(math.isfinite, numbers)))
-    return numbers
+    def parse(value: Any) -> tuple[Any, ...]:
+        parts = value if isinstance(value, list | tuple) else re.split(f"[{separators}]", str(value))
+        numbers = tuple(int(str(part)) if whole else float(part) for part in parts)
+        _require(all(0 <= each < 10**9 if whole else math.isfinite(each) for each in numbers))
+        _require(holds(*numbers))
+        return numbers
 
-
-def _whole_numbers(value: Any, separators: str) -> tuple[int, ...]:
-    """Split at one of the characters; all of the numbers have at most nine digits, and no sign."""
-    numbers = tuple(int(str(part)) for part in _parts(value, separators))
-    _require(all(0 <= number < 10**9 for number in numbers))
-    return numbers
+    return parse
 
 
 def span(least: float, most: float) -> Parsed:
     """Return the type of a range of numbers within bounds; one number is a range too."""
-
-    def parse(value: Any) -> tuple[float, float]:
-        ends = _numbers(value, ":")
-        _require(len(ends) < 3 and least <= ends[0] <= ends[-1] <= most)
-        return ends[0], ends[-1]
-
-    return Parsed("A:B", parse, f"A:B with {least:g} <= A <= B <= {most:g}, nor one such number", ":")
-
-
-def _wide_span(value: Any) -> tuple[float, float]:
-    first, last = _numbers(value, ":")
-    _require(first < last)
-    return first, last
+    ends = _numbers(":", lambda first, *last: len(last) < 2 and least <= first <= (*last, first)[0] <= most)
+    what = f"A:B with {least:g} <= A <= B <= {most:g}, nor one such number"
+    return Parsed("A:B", lambda value: (2 * ends(value))[:2], what, ":")
 
 
 def _any_number(value: Any) -> float:
@@ -213,18 +204,8 @@ def _any_number(value: Any) -> float:
     return float(value)
 
 
-def _roi(value: Any) -> tuple[int, int, int, int]:
-    x0, y0, x1, y1 = _whole_numbers(value, ",")
-    _require(x0 < x1 and y0 < y1)
-    return x0, y0, x1, y1
-
-
-def _point(value: Any) -> tuple[float, float]:
-    u, v = _numbers(value, ",")
-    return u, v
-
-
 _FAR = 1_000_000  # pixels; OpenCV goes through every row of a polygon, also those outside of the map
+_point = _numbers(",", lambda u, v: True)
 
 
 def _polygon(value: Any) -> tuple[tuple[float, float], ...]:
@@ -233,35 +214,21 @@ def _polygon(value: Any) -> tuple[tuple[float, float], ...]:
     return corners
 
 
-def _shard(value: Any) -> tuple[int, int]:
-    part, parts = _whole_numbers(value, "/")
-    _require(1 <= part <= parts)
-    return part, parts
-
-
-def _turns(value: Any) -> tuple[float, float, float]:
-    first, last, step = _numbers(value, ":")
-    _require(-90 <= first <= last <= 90 and step > 0 and last - first <= 1000 * step)
-    return first, last, step
-
-
-def _size(value: Any) -> tuple[int, int]:
-    width, height = _whole_numbers(value, "xX×")
-    _require(min(width, height) >= 16 and max(width, height) <= 16384)
-    return width, height
-
-
-WIDE_SPAN = Parsed("A:B", _wide_span, "A:B with A < B, such as -0.1:0.1")
+_box = _numbers(",", lambda x0, y0, x1, y1: x0 < x1 and y0 < y1, whole=True)
+_part = _numbers("/", lambda part, parts: 1 <= part <= parts, whole=True)
+_size = _numbers("xX×", lambda width, height: 16 <= width <= 16384 and 16 <= height <= 16384, whole=True)
+_turns = _numbers(  # at most 1000 angles
+    ":", lambda low, high, step: -90 <= low <= high <= 90 and step > 0 and high - low <= 1000 * step
+)
+WIDE_SPAN = Parsed("A:B", _numbers(":", lambda low, high: low < high), "A:B with A < B, such as -0.1:0.1")
 ANY_NUMBER = Parsed("VALUE", _any_number, "a number")  # that a pixel may hold: also nan and inf
-ROI = Parsed("X0,Y0,X1,Y1", _roi, "X0,Y0,X1,Y1 in whole pixels with X0 < X1 and Y0 < Y1")
+ROI = Parsed("X0,Y0,X1,Y1", _box, "X0,Y0,X1,Y1 in whole pixels with X0 < X1 and Y0 < Y1")
 POINT = Parsed("CX,CY", _point, "CX,CY in pixels, such as 609.6,172.9")
 POLYGON = Parsed(
     "'X,Y X,Y X,Y …'",
     _polygon,
     "three or more corners such as '0,375 600,180 1242,375', within a million pixels",
 )
-SHARD = Parsed("I/N", _shard, "I/N with I from 1 to N, such as 2/8", "/")
-TURNS = Parsed(  # at most 1000 angles
-    "A:B:STEP", _turns, "A:B:STEP in degrees with -90 <= A <= B <= 90, such as -20:20:2", ":"
-)
+SHARD = Parsed("I/N", _part, "I/N with I from 1 to N, such as 2/8", "/")
+TURNS = Parsed("A:B:STEP", _turns, "A:B:STEP in degrees with -90 <= A <= B <= 90, such as -20:20:2", ":")
 IMAGE_SIZE = Parsed("WxH", _size, "WxH in whole pixels, 16 to 16384 each way, such as 640x480", "x")
