@@ -112,13 +112,8 @@ def order_of(parts: Sequence[Part]) -> NDArray[np.intp]:
             )
     known = [shard for shard in shards if shard is not None]
     _check_shards(parts, known)
-    if _options(parts[0].run).get("shard-by") == "range":
-        places = [np.full(len(p.files), index) for p, (index, _) in zip(parts, known, strict=True)]
-    else:
-        places = [
-            index - 1 + count * np.arange(len(p.files))
-            for p, (index, count) in zip(parts, known, strict=True)
-        ]
+    apart = 0 if _options(parts[0].run).get("shard-by") == "range" else known[0][1]
+    places = [index + apart * np.arange(len(p.files)) for p, (index, _) in zip(parts, known, strict=True)]
     return np.argsort(np.concatenate(places), kind="stable")
 
 
