@@ -7,16 +7,10 @@ import click
 from rollcli.cli import options as shared
 from rollcli.cli.command import command, config_option, option, section
 from rollcli.cli.types import DIR, FLAG, RESULT, Choice, Number
-from rollcli.run.options import (
-    ConvertOptions,
-    DerotateOptions,
-    DisparityOptions,
-    HeightsOptions,
-    VDisparityOptions,
-)
+from rollcli.run import options as records
 
 
-def _run(ctx: click.Context, options: ConvertOptions) -> None:
+def _run(ctx: click.Context, options: records.ConvertOptions) -> None:
     from rollcli.run.convert import run_conversion
 
     ctx.exit(run_conversion(options))
@@ -32,7 +26,7 @@ rotation_options = section(
 )
 
 
-@command(fields=DerotateOptions)
+@command(fields=records.DerotateOptions)
 @shared.input_options
 @rotation_options
 @shared.output_folder_option
@@ -60,10 +54,10 @@ def derotate(ctx: click.Context, /, **options: Any) -> None:
         rollcli derotate maps/ --roll 2.5 --expand -o upright/
     """
     result, roll_deg = options.pop("from"), options.pop("roll")
-    _run(ctx, DerotateOptions(**options, result=result, roll_deg=roll_deg))
+    _run(ctx, records.DerotateOptions(**options, result=result, roll_deg=roll_deg))
 
 
-@command(fields=DisparityOptions)
+@command(fields=records.DisparityOptions)
 @shared.pair_input_options
 @shared.pair_options
 @shared.topic_options
@@ -90,7 +84,7 @@ def disparity(ctx: click.Context, /, **options: Any) -> None:
     A video that holds both views
         rollcli disparity drive.mp4 --side-by-side -o maps/
     """
-    _run(ctx, DisparityOptions(**options))
+    _run(ctx, records.DisparityOptions(**options))
 
 
 count_options = section(
@@ -103,7 +97,7 @@ count_options = section(
 )
 
 
-@command(fields=VDisparityOptions)
+@command(fields=records.VDisparityOptions)
 @shared.input_options
 @count_options
 @shared.output_folder_option
@@ -132,10 +126,10 @@ def vdisparity(ctx: click.Context, /, **options: Any) -> None:
     A figure for a paper
         rollcli vdisparity maps/7.png --figure pdf --from rolls.csv -o figures/
     """
-    _run(ctx, VDisparityOptions(result=options.pop("from"), **options))
+    _run(ctx, records.VDisparityOptions(result=options.pop("from"), **options))
 
 
-@command(fields=HeightsOptions)
+@command(fields=records.HeightsOptions)
 @shared.input_options
 @option("--from", RESULT, required=True, section="Road")
 @option("--skip-suspect", FLAG, section="Road")
@@ -169,4 +163,4 @@ def heights(ctx: click.Context, /, **options: Any) -> None:
     At once, of stereo pairs too
         rollcli estimate maps/ -o rolls.csv --heights heights/
     """
-    _run(ctx, HeightsOptions(result=options.pop("from"), **options))
+    _run(ctx, records.HeightsOptions(result=options.pop("from"), **options))

@@ -22,19 +22,7 @@ from rollcli.cli.types import (
 )
 from rollcli.estimator.request import AREAS, MAX_ROLL_LIMIT_DEG, METHODS, MODELS, ROADS
 from rollcli.rig.calibration import CalibrationOptions
-from rollcli.run.options import (
-    HEIGHTS_RANGE,
-    KINDS,
-    EncodingOptions,
-    ImageOptions,
-    InputOptions,
-    Layout,
-    MethodOptions,
-    PairOptions,
-    RegionOptions,
-    RunningOptions,
-    TopicOptions,
-)
+from rollcli.run import options as records
 from rollcli.stereo.options import MODES, StereoOptions
 
 
@@ -75,29 +63,29 @@ _named = (click.argument("inputs", nargs=-1, type=PATH), option("--files-from", 
 input_options = record(
     "inputs",
     "Input",
-    InputOptions,
+    records.InputOptions,
     *_named,
     option("--sorted", FLAG),
     option("--topic", Text("TOPIC")),
     *_folders,
 )
 
-pair_input_options = record("inputs", "Input", InputOptions, *_named, *_folders)
+pair_input_options = record("inputs", "Input", records.InputOptions, *_named, *_folders)
 
 pair_options = record(
     "pairs",
     "Stereo pairs",
-    PairOptions,
+    records.PairOptions,
     option("--left", PATH),
     option("--right", PATH),
     option("--match", Choice("name", "order"), _PAIRS),
-    option("--side-by-side", Choice(*get_args(Layout)), without_word="left-right"),
+    option("--side-by-side", Choice(*get_args(records.Layout)), without_word="left-right"),
 )
 
 topic_options = record(
     "topics",
     "Views of a bag",
-    TopicOptions,
+    records.TopicOptions,
     option("--left-topic", Text("TOPIC")),
     option("--right-topic", Text("TOPIC")),
     option("--sync-tolerance", Number("MS", at_least=0)),
@@ -155,7 +143,7 @@ stereo_options = record(
 encoding_options = record(
     "encoding",
     "What the stored numbers mean",
-    EncodingOptions,
+    records.EncodingOptions,
     option("--encoding", Choice("auto", "px", "kitti", "cityscapes", "sgbm", "depth", "foundationstereo")),
     option("--scale", Number("F", but=0)),
     option("--invalid", ANY_NUMBER, multiple=True),
@@ -165,7 +153,7 @@ encoding_options = record(
 region_options = record(
     "region",
     "Which pixels",
-    RegionOptions,
+    records.RegionOptions,
     option("--mask", PATH),
     option("--roi", ROI),
     option("--polygon", POLYGON),
@@ -174,7 +162,7 @@ region_options = record(
 method_options = record(
     "method",
     "Method",
-    MethodOptions,
+    records.MethodOptions,
     option(
         "--method",
         Choice(*METHODS),
@@ -219,7 +207,7 @@ heights_range_option = option(
     WIDE_SPAN,
     text="Heights with the outermost colours of a preview, A:B, metres or camera heights.",
     section="Output",
-    default="{:.2f}:{:.2f}".format(*HEIGHTS_RANGE),
+    default="{:.2f}:{:.2f}".format(*records.HEIGHTS_RANGE),
 )
 
 
@@ -230,7 +218,7 @@ save_as_option = option(
     Needs(
         lambda ctx: (
             ctx.command.name == "disparity"
-            or any(ctx.params[kind.name] for kind in KINDS if kind.holds != "picture")
+            or any(ctx.params[kind.name] for kind in records.KINDS if kind.holds != "picture")
         ),
         "only --disparity, --derotated and --heights write maps",
     ),
@@ -246,8 +234,8 @@ output_folder_option = option("-o, --output", DIR, required=True, section="Outpu
 image_options = record(
     "images",
     "Images to write, named after their input",
-    ImageOptions,
-    *(option(f"--{kind.name.replace('_', '-')}", DIR) for kind in KINDS),
+    records.ImageOptions,
+    *(option(f"--{kind.name.replace('_', '-')}", DIR) for kind in records.KINDS),
     heights_range_option,
     save_as_option,
 )
@@ -260,10 +248,10 @@ _running = (
     option("-v, --verbose", FLAG),
 )
 
-running_options = record("running", "Running", RunningOptions, *_running)
+running_options = record("running", "Running", records.RunningOptions, *_running)
 
 cluster_options = record(
-    "running", "Running", RunningOptions, *_running, option("--scheduler", Text("ADDRESS"))
+    "running", "Running", records.RunningOptions, *_running, option("--scheduler", Text("ADDRESS"))
 )
 
 
