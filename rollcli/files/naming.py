@@ -5,6 +5,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import TypeVar
+
+Key = TypeVar("Key")
+Value = TypeVar("Value")
 
 # the marks of a left and of a right image: a word or letter of its own, leftImg8bit, m1_L1, 000123r
 _WORDS = (
@@ -104,32 +108,33 @@ def match_names(lefts: Sequence[str], rights: Sequence[str], *, marked: bool = F
     the frame_1 of another moment.
     """
     if not marked:
-        equal = _matching(_grouped(map(_stem, lefts)), _grouped(map(_stem, rights)))
+        equal = _matching(map(_stem, lefts), map(_stem, rights))
         if equal[0]:
             return equal
     attempts = [
         _matching(
-            _grouped(_unmarked(each, left_mark, 0, marked) for each in lefts),
-            _grouped(_unmarked(each, right_mark, 1, marked) for each in rights),
+            (_unmarked(each, left_mark, 0, marked) for each in lefts),
+            (_unmarked(each, right_mark, 1, marked) for each in rights),
         )
         for left_mark, right_mark in _NUMBERS
     ]
     return max(attempts, key=lambda each: len(each[0]))
 
 
-def _matching(left_of: dict[str, list[int]], right_of: dict[str, list[int]]) -> Matching:
-    shared = [key for key in left_of if key in right_of]
-    ambiguous = [
-        (left_of[key], right_of[key]) for key in shared if len(left_of[key]) + len(right_of[key]) > 2
-    ]
-    return [(left_of[key][0], right_of[key][0]) for key in shared], next(iter(ambiguous), None)
+def _matching(*keys_of: Iterable[str | None]) -> Matching:
+    left_of, right_of = (
+        gathered((key, place) for place, key in enumerate(keys) if key is not None) for keys in keys_of
+    )
+    both = [(left_of[key], right_of[key]) for key in left_of if key in right_of]
+    pairs = [(lefts[0], rights[0]) for lefts, rights in both]
+    return pairs, next((sides for sides in both if sum(map(len, sides)) > 2), None)
 
 
-def _grouped(keys: Iterable[str | None]) -> dict[str, list[int]]:
-    groups: dict[str, list[int]] = {}
-    for position, key in enumerate(keys):
-        if key is not None:
-            groups.setdefault(key, []).append(position)
+def gathered(pairs: Iterable[tuple[Key, Value]]) -> dict[Key, list[Value]]:
+    """Gather what has the same key, in the order it comes in."""
+    groups: dict[Key, list[Value]] = {}
+    for key, value in pairs:
+        groups.setdefault(key, []).append(value)
     return groups
 
 

@@ -13,7 +13,7 @@ from rollcli.extras import require_extra
 from rollcli.files.atomic import is_file
 from rollcli.files.containers import BAGS, VIDEOS, bag_files, file_of, frame_name, is_rest, is_video
 from rollcli.files.inputs import Manifest, find_inputs, named_input, pair_inputs
-from rollcli.files.naming import Input
+from rollcli.files.naming import Input, gathered
 from rollcli.files.search import IMAGE_ENDINGS, LEAVE_NONE, MAP_ENDINGS, Search, is_place, objects_behind
 from rollcli.files.storage import fetch_all, read_bytes
 from rollcli.files.stores.locations import is_url, names_a_file, public_name
@@ -100,7 +100,7 @@ class Calibrations:
         fetched: dict[str, bytes] = {}
         if len(given.calib) == 1 and is_place(given.calib[0]):
             files = _files(given.calib[0])
-            self._by_stem = _gathered((PurePosixPath(path).stem.removesuffix(_MARK), path) for path in files)
+            self._by_stem = gathered((PurePosixPath(path).stem.removesuffix(_MARK), path) for path in files)
             fetched = fetch_all(filter(is_url, files), MAX_BYTES)  # one after the other takes long
         elif given.given:
             self._one = _read(given.calib, given)
@@ -117,14 +117,6 @@ class Calibrations:
             if not shorter:
                 raise UsageError(f"{name}: has no calibration of its name in {folder}")
         return self._read(_only(self._by_stem[shorter], "calibration", name))
-
-
-def _gathered(files: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
-    """Gather paths by their stems."""
-    found: dict[str, list[str]] = {}
-    for stem, path in files:
-        found.setdefault(stem, []).append(path)
-    return found
 
 
 def _only(paths: Sequence[str], what: str, name: str) -> str:
@@ -434,7 +426,7 @@ class _FrameMaker:
         self._masks: dict[str, list[str]] | None = None
         if self._mask is not None and is_place(self._mask):
             found = find_inputs([self._mask], Search(recursive=True))
-            self._masks = _gathered((Path(frame_name(each.name)).stem, each.location) for each in found)
+            self._masks = gathered((Path(frame_name(each.name)).stem, each.location) for each in found)
         elif self._mask is not None and not (is_url(self._mask) or is_file(self._mask)):
             raise UsageError(f"{self._mask}: no such mask file or folder")
 

@@ -15,6 +15,7 @@ from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files import storage
 from rollcli.files.atomic import is_folder, mark_path, remove_leftovers
 from rollcli.files.containers import file_of, shown
+from rollcli.files.naming import gathered
 from rollcli.files.results import STATUSES
 from rollcli.files.storage import create, read_bytes, remove, remove_all, write_bytes
 from rollcli.files.stores.locations import is_object_url, is_url, located, public_name
@@ -190,11 +191,8 @@ def check_places(frames: Sequence[Frame], folders: Iterable[str] = ()) -> None:
     UsageError
         The bucket does not exist or is elsewhere, the keys are wrong or have expired, or the like.
     """
-    asked: dict[str, list[str]] = {}
-    for path in dict.fromkeys(path for frame in (*frames[:1], *frames[-1:]) for path in frame.reads()):
-        if is_url(path):
-            asked.setdefault("/".join(path.split("/", 3)[:3]), []).append(path)
-    for paths in asked.values():
+    few = dict.fromkeys(path for frame in (*frames[:1], *frames[-1:]) for path in frame.reads())
+    for paths in gathered(("/".join(path.split("/", 3)[:3]), path) for path in few if is_url(path)).values():
         problems = [storage.read_problem(path) for path in paths]
         if all(problems):
             raise UsageError(f"{public_name(paths[0])}: cannot be read: {problems[0]}")

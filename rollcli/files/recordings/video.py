@@ -23,7 +23,7 @@ from rollcli.errors import InputError, UsageError, as_usage
 from rollcli.files.bounded import state_of
 from rollcli.files.codecs.pictures import half_size
 from rollcli.files.codecs.raw_map import require_decoded_fits
-from rollcli.files.naming import Input
+from rollcli.files.naming import Input, gathered
 
 _BOXES = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"styp")  # that MP4 and MOV begin with
 _EBML, _SEGMENT = 0x1A45DFA3, 0x18538067  # Matroska's
@@ -214,7 +214,7 @@ def _end_of_avi(file: BinaryIO, size: int) -> int:
 
 
 def _end_of_mp4(file: BinaryIO, size: int) -> int:
-    return max((end for _, _, end in _walk(file, 0, size)), default=0)
+    return max((end for _, (_, end) in _walk(file, 0, size)), default=0)
 
 
 def _leaves_out(path: str) -> bool:
@@ -242,13 +242,10 @@ def _leaves_out(path: str) -> bool:
 
 def _boxes(file: BinaryIO, at: int, end: int) -> dict[bytes, list[tuple[int, int]]]:
     """Return where the contents of the boxes in a part of an MP4 begin and end, by their kind."""
-    found: dict[bytes, list[tuple[int, int]]] = {}
-    for kind, first, last in _walk(file, at, end):
-        found.setdefault(kind, []).append((first, last))
-    return found
+    return gathered(_walk(file, at, end))
 
 
-def _walk(file: BinaryIO, at: int, end: int) -> Iterator[tuple[bytes, int, int]]:
+def _walk(file: BinaryIO, at: int, end: int) -> Iterator[tuple[bytes, tuple[int, int]]]:
     """Yield the kind of each box in a part of an MP4, and where its content begins and ends."""
     while at + 8 <= end:
         file.seek(at)
@@ -257,7 +254,7 @@ def _walk(file: BinaryIO, at: int, end: int) -> Iterator[tuple[bytes, int, int]]
             (length,), head = struct.unpack(">Q", file.read(8)), 16
         if length < head:  # 0: up to the end of the file
             length = end - at
-        yield kind, at + head, at + length
+        yield kind, (at + head, at + length)
         at += length
 
 
