@@ -194,7 +194,7 @@ def _numbers(
 
 def span(least: float, most: float) -> Parsed:
     """Return the type of a range of numbers within bounds; one number is a range too."""
-    ends = _numbers(":", lambda first, *last: len(last) < 2 and least <= first <= (*last, first)[0] <= most)
+    ends = _numbers(":", lambda low, high=None: least <= low <= (low if high is None else high) <= most)
     what = f"A:B with {least:g} <= A <= B <= {most:g}, nor one such number"
     return Parsed("A:B", lambda value: (2 * ends(value))[:2], what, ":")
 

@@ -90,7 +90,7 @@ _KEPT_SPREAD = 0.15  # px
 # px per px; standard deviation of what the rows leave open of the columns. It turns a road by 0.35 degrees
 # (95 %) where the baseline is a third of the camera's height
 _OPEN_COLUMNS = 0.001
-_FURTHEST = Misalignment(12.0, 0.03, 0.02, 0.0)  # what no rig in use has: px, radians, share
+_FURTHEST = 12.0, 0.03, 0.02  # offset, rotation and scale that no rig in use has: px, radians, share
 # the doubts of a pair: its correction was still changing when it was given up, or could not be checked; its
 # columns may be far from where they are believed to be; it is not level once it was levelled as a file says
 NOT_LEVELLED = "the views are not level, and could not be levelled"
@@ -364,11 +364,7 @@ def _match_levelled(
 
 
 def _doubt(corrected: Misalignment, errors: Misalignment) -> str:
-    far = (
-        abs(corrected.offset) > _FURTHEST.offset
-        or abs(corrected.rotation) > _FURTHEST.rotation
-        or abs(corrected.scale) > _FURTHEST.scale
-    )
+    far = any(abs(part) > most for part, most in zip(corrected.parts[:3], _FURTHEST, strict=True))
     far |= abs(corrected.scale) > _UNUSUAL_SCALE and errors.offset > _UNUSUAL_ERROR
     return "the views lie too far from level to be sure of the correction" if far else ""
 

@@ -167,13 +167,7 @@ def _inflated(packed: bytes, size: int) -> NDArray[np.uint8] | None:
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _GREY, _COLOUR, _PALETTE, _GREY_ALPHA, _COLOUR_ALPHA = 0, 2, 3, 4, 6
 _CHANNELS = {_GREY: 1, _COLOUR: 3, _PALETTE: 1, _GREY_ALPHA: 2, _COLOUR_ALPHA: 4}
-_DEPTHS = {
-    _GREY: (1, 2, 4, 8, 16),
-    _COLOUR: (8, 16),
-    _PALETTE: (1, 2, 4, 8),
-    _GREY_ALPHA: (8, 16),
-    _COLOUR_ALPHA: (8, 16),
-}
+_DEPTHS = {**dict.fromkeys(_CHANNELS, (8, 16)), _GREY: (1, 2, 4, 8, 16), _PALETTE: (1, 2, 4, 8)}
 _TEXT_KEY = b"rollcli\0"
 _MAX_SIDE = 1_000_000  # libpng's own limit
 _MAX_EXPANSION = 1032  # of Deflate
