@@ -119,6 +119,33 @@ class Calibrations:
         return self._read(_only(self._by_stem[shorter], "calibration", name))
 
 
+class Masks:
+    """The masks that a user named: none, one for all frames, or a folder with one of each stem.
+
+    Raises
+    ------
+    UsageError
+        There is no such file or folder.
+    """
+
+    def __init__(self, mask: str | None) -> None:
+        self._mask, self._by_stem = mask, None
+        if mask is not None and is_place(mask):
+            found = find_inputs([mask], Search(recursive=True))
+            self._by_stem = gathered((Path(frame_name(each.name)).stem, each.location) for each in found)
+        elif mask is not None and not (is_url(mask) or is_file(mask)):
+            raise UsageError(f"{mask}: no such mask file or folder")
+
+    def of(self, name: str) -> str | None:
+        """Return the mask of a frame."""
+        if self._by_stem is None:
+            return self._mask
+        stem = PurePath(frame_name(name)).stem
+        if stem not in self._by_stem:
+            raise UsageError(f"{name}: has no mask of its name in {self._mask}")
+        return _only(self._by_stem[stem], "mask", name)
+
+
 def _only(paths: Sequence[str], what: str, name: str) -> str:
     """Return the one path of a stem; which of several is meant for a frame, nobody can tell."""
     if len(paths) > 1:
@@ -422,21 +449,10 @@ class _FrameMaker:
 
     def __init__(self, named: Named) -> None:
         self.calibrations, self.quiet = Calibrations(named.calibration), named.quiet
-        self._mask = named.region.mask
-        self._masks: dict[str, list[str]] | None = None
-        if self._mask is not None and is_place(self._mask):
-            found = find_inputs([self._mask], Search(recursive=True))
-            self._masks = gathered((Path(frame_name(each.name)).stem, each.location) for each in found)
-        elif self._mask is not None and not (is_url(self._mask) or is_file(self._mask)):
-            raise UsageError(f"{self._mask}: no such mask file or folder")
+        self._masks = Masks(named.region.mask)
 
     def frame(self, left: Input, right: Input | None = None, calibration: Calibration | None = None) -> Frame:
         """Make the frame of a map, or of the views of a pair; `calibration` is that of its bag."""
-        mask, stem = self._mask, PurePath(frame_name(left.name)).stem
-        if self._masks is not None:
-            if stem not in self._masks:
-                raise UsageError(f"{left.name}: has no mask of its name in {self._mask}")
-            mask = _only(self._masks[stem], "mask", left.name)
         # what is made of an input must stay in its folder, whatever a store or an archive calls it
         foreign = is_url(left.location) or file_of(left.location) != left.location
         return Frame(
@@ -445,6 +461,6 @@ class _FrameMaker:
             path=left.location,
             right_path=right.location if right else "",
             relative=left.relative if not foreign or names_a_file(left.relative) else "",
-            mask=mask,
+            mask=self._masks.of(left.name),
             calibration=self.calibrations.of(left.name) or calibration,
         )

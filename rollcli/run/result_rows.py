@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rollcli.errors import RollcliError, UsageError
@@ -12,6 +13,7 @@ from rollcli.files.naming import listed
 from rollcli.files.results import Row, read_result, run_path
 from rollcli.files.stores.locations import is_remote, is_url
 from rollcli.messages import say
+from rollcli.run.find import Masks
 from rollcli.run.frame import Frame
 from rollcli.run.options import FrameOptions
 from rollcli.run.resume import recorded_options
@@ -53,9 +55,10 @@ def rows_of(
     ]
     if elsewhere:
         recorded = recorded_options(read.run, run_path(result))
+        masks = _masks_of(recorded, result)
         for at in {round(i * (len(elsewhere) - 1) / (_COMPARED - 1)): None for i in range(_COMPARED)}:
             frame, row = elsewhere[at]
-            if not _is_copy(frame, row, recorded):
+            if not _is_copy(replace(frame, mask=masks.of(row.file)), row, recorded):
                 differ = f"its row is of {row.file}, and not of {frame.file}"
                 raise UsageError(f"{result}: {differ}: give the result of these maps")
     _tell_suspects(matched, result, skip_suspect=skip_suspect, quiet=quiet)
@@ -64,14 +67,23 @@ def rows_of(
 
 def frame_of_row(row: Row, result: str) -> Frame:
     """Return the frame of a row; names are of where `estimate` ran: of this folder, or of the result's."""
-    folder = Path() if is_url(result) else Path(result).parent  # names in a bucket are whole URLs
-    path, right = (_located(name, folder) for name in (row.file, row.right_file))
+    path, right = (_located(name, result) for name in (row.file, row.right_file))
     return Frame(row.file, row.right_file, path, right, relative=row.file, mask=None)
 
 
-def _located(name: str, folder: Path) -> str:
+def _masks_of(recorded: FrameOptions, result: str) -> Masks:
+    """Find the masks of a result's run, without which its maps have other angles."""
+    mask = recorded.region.mask
+    try:
+        return Masks(mask and _located(mask, result))
+    except UsageError as error:
+        raise UsageError(f"{result}: its maps are known by the mask that they had: {error}") from error
+
+
+def _located(name: str, result: str) -> str:
     if not name or is_remote(name):  # even a look at a share of Windows is a request
         return name
+    folder = Path() if is_url(result) else Path(result).parent  # names in a bucket are whole URLs
     beside = str(folder / name)
     return beside if not is_there(file_of(name)) and is_there(file_of(beside)) else name
 

@@ -213,11 +213,20 @@ def recorded_options(run: Mapping[str, Any] | None, name: str) -> FrameOptions:
             encoding=_filled(EncodingOptions(), given),
             method=_filled(MethodOptions(), given),
             stereo=_filled(StereoOptions(), given),
+            region=_region(given),
             images=_filled(ImageOptions(), given),
             side_by_side=layout,
         )
     except (TypeError, ValueError) as error:
         raise InputError(f"{name}: is not the record of a run: {error}") from error
+
+
+def _region(given: Mapping[str, Any]) -> RegionOptions:
+    mask, roi, polygon = (given.get(name) for name in RegionOptions._fields)
+    if not isinstance(mask, str | None) or (roi is not None and len(roi) != 4):
+        raise TypeError(f"mask is {mask!r}, roi {roi!r}")
+    corners = polygon and tuple((float(x), float(y)) for x, y in polygon)
+    return RegionOptions(mask, roi and tuple(map(int, roi)), corners)
 
 
 def _filled(defaults: Options, given: Mapping[str, Any]) -> Options:
