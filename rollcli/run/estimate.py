@@ -12,7 +12,7 @@ from rollcli.run.batch import Batch, BatchOptions, Step, join_results, line_form
 from rollcli.run.find import calibration_files, calibration_notes
 from rollcli.run.frame import Frame, FrameResult, ReadAs, failed_frame
 from rollcli.run.options import EstimateOptions, FrameOptions
-from rollcli.run.outputs import every_path, list_files, possible_paths, remove_image_leftovers, write_outputs
+from rollcli.run.outputs import every_path, list_files, remove_image_leftovers, write_outputs
 from rollcli.run.plan import Plan, decoder_for, make_plan, workers_for
 from rollcli.run.progress import Progress
 from rollcli.run.result import Output, frames_to_do, open_output
@@ -63,9 +63,7 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
     if not options.running.dry_run:
         return _run(plan, resume_command)
     frames, images = frames_to_do(plan), options.images
-    of_frames = (
-        (frame.reads(), (paths[0] for _, paths in possible_paths(frame, images))) for frame in frames
-    )
+    of_frames = ((frame.reads(), every_path(frame, images)) for frame in frames)
     list_files(chain([(calibration_files(options.calibration), ())], of_frames, [((), plan.files)]))
     return ExitStatus.DONE
 
