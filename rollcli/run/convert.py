@@ -74,7 +74,7 @@ def _plan(options: ConvertOptions) -> list[Frame]:
     _check_options(options)
     frames = _find_frames(options)
     rows = _find_rows(frames, options)
-    say(*check_first_size(frames, options.frame))
+    say(*check_first_size(frames, options.frame)[0])
     wanted = [
         replace(frame, row=row)
         for frame, row in zip(frames, rows, strict=True)

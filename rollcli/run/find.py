@@ -164,8 +164,15 @@ def calibration_notes(frames: Sequence[Frame]) -> list[str]:
     return list(dict.fromkeys(note for calibration in used for note in calibration.notes))
 
 
-def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> list[str]:
-    """Refuse a calibration that is not for the size of the first frame; say what speaks against its size.
+def check_first_size(frames: Iterable[Frame], options: FrameOptions) -> tuple[list[str], Calibration | None]:
+    """Refuse a calibration that is not for the size of the first frame.
+
+    Returns
+    -------
+    notes : list of str
+        What speaks against its size.
+    calibration : Calibration or None
+        Of the first frame's map, whose sides may have been rounded; None where that cannot be told.
 
     Raises
     ------
@@ -174,19 +181,21 @@ def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> list[str
     """
     first = next((frame for frame in frames if frame.calibration is not None or options.side_by_side), None)
     if first is None:
-        return []
+        return [], None
     from rollcli.files.formats import read_stored  # only here does a dispatcher decode an image
     from rollcli.run.read import read_views
+    from rollcli.stereo.views import matched_shape
 
     try:
         if first.right_file:
-            height, width = read_views(first, options)[0].shape[:2]
+            shape = read_views(first, options)[0].shape[:2]
         else:
-            height, width = read_stored(
+            shape = read_stored(
                 options.at(first.path), first.file, rgb=options.encoding.encoding == "foundationstereo"
             ).values.shape
     except InputError:
-        return []  # its row will say so
+        return [], None  # its row will say so
+    height, width = shape
     if first.calibration is None:
         if width < height and options.side_by_side == "left-right":
             raise UsageError(
@@ -194,12 +203,12 @@ def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> list[str
                 "squeezed into one image, which changes angles: stretch them to twice their width, or give "
                 "--calib, or --focal and --principal-point, of the views as they are"
             )
-        return []
+        return [], None
     doubt = first.calibration.seems_of_another_size(width, height)
     if doubt:
-        return [doubt]
-    first.calibration.for_size(width, height)
-    return []
+        return [doubt], None
+    matched = matched_shape(shape, options.stereo.downscale if first.right_file else 1.0)
+    return [], first.calibration.for_size(width, height).for_size(*reversed(matched))
 
 
 def check_depth(frames: Sequence[Frame], encoding: EncodingOptions) -> None:

@@ -10,6 +10,7 @@ from rollcli.files.containers import file_of
 from rollcli.files.results import IMAGE_ROLL, TIMING, Format, require_utf8, run_path
 from rollcli.files.stores.locations import is_url, tasks_in_hand
 from rollcli.files.stream import is_stream
+from rollcli.rig.calibration import Calibration
 from rollcli.run import outputs
 from rollcli.run.find import Named, calibration_files, check_depth, check_first_size, map_frames, pair_frames
 from rollcli.run.frame import Frame
@@ -78,11 +79,12 @@ def make_plan(options: EstimateOptions) -> Plan:
         lambda: chain(calibrations, (path for frame in plan.frames for path in frame.reads())),
         chain(plan.files, outputs.images_of(plan.frames, options.images)),
     )
-    further = further_columns(frames, options)
-    frames = _shard(frames, options.result)
+    every, frames = frames, _shard(frames, options.result)
     outputs.check_places(frames, [folder for _, folder in options.images.folders()])
-    checked = options.calibration.given or options.pairs.side_by_side is not None
-    notes = check_first_size(frames, options.frame) if checked else []
+    calibrated = options.calibration.given or any(frame.calibration for frame in every[:1])
+    checked = calibrated or options.pairs.side_by_side is not None
+    notes, first = check_first_size(every, options.frame) if checked else ([], None)
+    further = further_columns(every, first, options)
     if not (options.running.overwrite or options.result.resume):
         outputs.check_nothing_is_there(outputs.images_of(frames, options.images))
     if plan.format == "parquet" and is_stream(plan.output):
@@ -104,11 +106,16 @@ def _check_start(options: EstimateOptions) -> None:
         raise UsageError(f"{flag} needs a result file: name it with --output")
 
 
-def further_columns(frames: Sequence[Frame], options: EstimateOptions) -> tuple[str, ...]:
-    """List the columns that the result has beside those of every result; shards of a run have the same."""
+def further_columns(
+    frames: Sequence[Frame], first: Calibration | None, options: EstimateOptions
+) -> tuple[str, ...]:
+    """List the columns that the result has beside those of every result; shards of a run have the same.
+
+    `first` is the calibration of the first map, where known.
+    """
     # of names that are read as they are needed, the first tells of all
     some = (frame.calibration for frame in (frames[:1] if options.inputs.sorted else frames))
-    stretched = any(camera is not None and camera.fx != camera.fy for camera in some)
+    stretched = any(camera is not None and camera.fx != camera.fy for camera in chain([first], some))
     return (*((IMAGE_ROLL,) if stretched else ()), *((TIMING,) if options.result.timing else ()))
 
 
