@@ -186,8 +186,7 @@ class _Chunked:
         except _DAMAGED:
             damaged = offset if damaged < 0 else damaged
         if damaged >= 0:
-            share = damaged / max(self._size, 1)
-            self.broken = f"is damaged or cut off at {share:.0%} of its {self._size} bytes"
+            self.broken = f"is damaged or cut off in what begins at byte {damaged} of its {self._size}"
 
     def read(self, place: tuple[int, int]) -> Message:
         """Read one message."""
