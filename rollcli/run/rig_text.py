@@ -106,6 +106,14 @@ def _segment(rig: RigAssessment, drive: DriveAssessment, place: int) -> dict[str
     return values
 
 
+_SEGMENT_COLUMNS = (
+    *("drive", "first", "last", "frames", "used", "suspect", "roll_deg", "roll_ci95_deg", "pitch_deg"),
+    *("pitch_ci95_deg", "height_m", "height_ci95_m", "first_file", "last_file", "between_frames_sd_deg"),
+    *("drift_deg", "drift_ci95_deg", "drift_deg_per_hour", "drift_ci95_deg_per_hour"),
+    *("change_deg", "change_ci95_deg", "status"),
+)
+
+
 def segment_rows(rig: RigAssessment) -> list[dict[str, Any]]:
     """Return the segments with what else is known of their drive: the lines of the CSV."""
     rows = []
@@ -180,7 +188,7 @@ def as_table(found: Findings) -> str:
 def as_csv(found: Findings) -> str:
     """Return a header, and a line for each segment."""
     rows = segment_rows(found.rig)
-    lines = csv_table([rows[0] if rows else ["drive"], *(row.values() for row in rows)])
+    lines = csv_table([_SEGMENT_COLUMNS, *([row[name] for name in _SEGMENT_COLUMNS] for row in rows)])
     return lines.decode("utf-8", "surrogateescape")
 
 
