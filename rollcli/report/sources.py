@@ -199,10 +199,15 @@ def _image(kind: ImageKind, row: Row, images: _ImageFolder, recorded: ImageOptio
     return None
 
 
+_TRUTH = "truth.csv"  # beside it lie the true disparities and heights of a simulation
+_TRUE = ("disparity", "heights")
+
+
 def _folders(kind: str, images: _ImageFolder, recorded: str | None) -> Iterator[str]:
     """Yield where images of a kind may be: in the folder named, under the name it had or the option's."""
     given = [] if recorded is None else [base_name(recorded.rstrip("/"))]
-    names = [name for name in dict.fromkeys([*given, kind]) if name != ".."]
+    usual = [] if kind in _TRUE and images.find(_TRUTH) is not None else [kind]
+    names = [name for name in dict.fromkeys([*given, *usual]) if name != ".."]
     for name in names:
         yield f"{name}/"
     if images.is_one_of(names, recorded):

@@ -58,7 +58,12 @@ def test_images_that_the_run_wrote_come_before_others_of_a_kinds_name(tmp_path):
     rollcli("simulate", "rig", "--frames", "1", "--size", "200x120", "--dips", "0", "-q", cwd=tmp_path)
     images = ["--disparity", "rig/maps", "--heights", "rig/over"]
     assert rollcli("estimate", *pair, "-o", "rig/rolls.csv", *images, cwd=tmp_path).status == 0
-    done = rollcli("report", "rig/rolls.csv", "--images", "rig", "-o", "page.html", "--dry-run", cwd=tmp_path)
-    read = [line.split()[1] for line in done.out.splitlines() if line.startswith("read ")]
+    assert rollcli("estimate", *pair, "-o", "rig/a.csv", "--derotated", "rig/up", cwd=tmp_path).status == 0
+
+    def read(result):
+        done = rollcli("report", result, "--images", "rig", "-o", "page.html", "--dry-run", cwd=tmp_path)
+        return [line.split()[1] for line in done.out.splitlines() if line.startswith("read ")][3:]
+
     # rig/disparity and rig/heights are the true ones of the simulation
-    assert read[3:] == ["rig/maps/frame_0001.png", "rig/over/frame_0001.tif"]
+    assert read("rig/rolls.csv") == ["rig/maps/frame_0001.png", "rig/over/frame_0001.tif"]
+    assert read("rig/a.csv") == ["rig/up/frame_0001.png"]
