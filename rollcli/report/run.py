@@ -17,7 +17,7 @@ from rollcli.report.sources import Subject, choose, subjects
 from rollcli.report.summary import common_run, frame_count
 from rollcli.rig.drive.assess import RigAssessment, assess_rig
 from rollcli.run.options import EncodingOptions
-from rollcli.run.outputs import listed_only
+from rollcli.run.outputs import check_named_once, listed_only
 from rollcli.run.progress import Progress
 from rollcli.run.resume import recorded_calibrations, recorded_options
 from rollcli.run.rig import order_of, origins_of
@@ -53,8 +53,7 @@ def run_report(options: ReportOptions) -> ExitStatus:
     if options.output is None:
         _require_charts_alone(options)
     require_extra("report", "the page")
-    if len(set(options.results)) < len(options.results):
-        raise UsageError(f"{listed(options.results)}: a result is named twice")
+    check_named_once(options.results)
     parts = [read_result(path) for path in options.results]
     for path, part in zip(options.results, parts, strict=True):
         if not part.rows:

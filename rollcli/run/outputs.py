@@ -201,6 +201,18 @@ def check_places(frames: Sequence[Frame], folders: Iterable[str] = ()) -> None:
             raise UsageError(f"{public_name(folder)}: cannot be written to: {problem}")
 
 
+def check_named_once(names: Sequence[str]) -> None:
+    """Refuse a file that is named twice, however differently its path is spelled.
+
+    Raises
+    ------
+    UsageError
+    """
+    paths = list(map(os.path.realpath, names))
+    if twice := [name for at, name in enumerate(names) if paths[at] in paths[:at]]:
+        raise UsageError(f"{twice[0]}: is named twice")
+
+
 def check_writes(reads: Sequence[str], writes: Sequence[str], *, overwrite: bool) -> None:
     """Check that no input is written and, unless `overwrite`, that no output exists.
 

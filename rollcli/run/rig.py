@@ -1,6 +1,5 @@
 """`rollcli rig` from the command line: what is read and written, and the exit status."""
 
-import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -24,7 +23,7 @@ from rollcli.rig.words import findings
 from rollcli.run.find import Calibrations
 from rollcli.run.frame import Frame
 from rollcli.run.options import FrameOptions, RigOptions
-from rollcli.run.outputs import listed_only
+from rollcli.run.outputs import check_named_once, listed_only
 from rollcli.run.read import FRAME_ERRORS, read_views, wanted_of
 from rollcli.run.result_rows import frame_of_row
 from rollcli.run.resume import recorded_options
@@ -226,9 +225,7 @@ def run_rig(options: RigOptions) -> int:
     outputs = filter(None, [options.output, options.correction])
     writes = [each for each in outputs if not is_stream(each)]
     for names in (reads, writes):
-        paths = list(map(os.path.realpath, names))
-        if twice := [name for at, name in enumerate(names) if paths[at] in paths[:at]]:
-            raise UsageError(f"{twice[0]}: is named twice")
+        check_named_once(names)
     check_options(options.gates)
     if listed_only(reads, writes, options.running):
         return 0
