@@ -16,13 +16,15 @@ class CalibrationOptions(NamedTuple):
         A file, or a folder with one of the same stem each: KITTI, Middlebury, ETH3D, OpenCV, ROS (twice:
         left, right), Cityscapes, ORB-SLAM, DrivingStereo; recognised by content.
     focal : float or None
-        Focal length, pixels. [default: the file's]
+        Focal length, pixels of images of the size that --calib states, else of those given. [default: the
+        file's]
     principal_point : tuple of float or None
-        Optical axis in the left view, from the centre of the top-left pixel. [default: the file's]
+        Optical axis in the left view, pixels as of --focal, from the centre of the top-left one. [default:
+        the file's]
     baseline : float or None
         Distance between the cameras, metres; gives the height. [default: the file's]
     doffs : float or None
-        CX of the right view less that of the left one, pixels. [default: the file's, else 0]
+        CX of the right view less that of the left one, pixels as of --focal. [default: the file's, else 0]
     """
 
     calib: tuple[str, ...] = ()

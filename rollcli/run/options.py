@@ -172,9 +172,9 @@ class RegionOptions(NamedTuple):
     mask : str or None
         Use only non-zero pixels: one mask for all, or a folder with one of the same stem each.
     roi : tuple of int or None
-        Use only this rectangle, pixels; X1 and Y1 are the first left out.
+        Use only this rectangle, pixels of the map; X1 and Y1 are the first left out.
     polygon : tuple of (float, float), or None
-        Use only the inside of these corners, pixels.
+        Use only the inside of these corners, pixels of the map.
     """
 
     mask: str | None = None
