@@ -34,6 +34,7 @@ from rollcli.stereo.views import Map, as_bright, prepare_views, shows_nothing, s
 _SURE = 0.3  # from here on the images are what they should be
 _FEW = 0.2  # below it, they show two scenes
 _PLAIN = 0.4  # from here on swapped images are swapped
+_COMPARED_FROM = 120  # px of width; of most narrower pairs of one scene too few blocks match
 _LEAST_TEXTURE = 0.07  # share of the blocks; images with less may show the same scene
 
 
@@ -66,8 +67,11 @@ def check_same_scene(small: SmallViews, look: FirstLook, measured: Measured | No
             "the views seem swapped: the scene is matched when the right image is taken for the left one"
         )
     if matched < _FEW * textured:
+        height, width = small.views[0].shape
+        small_ones = f"are too small to compare ({width}x{height} px), or " if width < _COMPARED_FROM else ""
         raise InputError(
-            "the two images do not show the same scene: hardly anything in one is found in the other"
+            f"the two images {small_ones}do not show the same scene: hardly anything in one is found in the "
+            "other"
         )
 
 

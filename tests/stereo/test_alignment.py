@@ -256,8 +256,16 @@ def test_swapped_and_turned_views_are_told(frame):
 def test_images_of_two_places_are_told(frame):
     elsewhere = render_frame(FrameSpec(scene="street", roll=0.05, seed=77, colour=False))
 
-    with pytest.raises(InputError, match="do not show the same scene"):
+    with pytest.raises(InputError, match="the two images do not show the same scene"):
         match_pair(frame.left, elsewhere.right, StereoOptions())
+
+
+def test_of_small_images_it_is_said_that_they_may_be_too_small(frame):
+    views = (frame.left, frame.right)
+    left, right = (cv2.resize(each, (80, 60), interpolation=cv2.INTER_AREA) for each in views)
+
+    with pytest.raises(InputError, match=r"too small to compare \(80x60 px\), or do not show the same"):
+        match_pair(left, right, StereoOptions())
 
 
 def test_one_image_given_twice_is_told(frame):
