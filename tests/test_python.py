@@ -174,6 +174,24 @@ def test_a_mask_that_leaves_nothing_of_a_pair_is_said():
     image = np.random.default_rng(0).integers(0, 256, (100, 200), dtype=np.uint8)
     with pytest.raises(rollcli.UsageError, match="mask leaves no pixel"):
         rollcli.estimate_pair(image, image, mask=np.zeros(image.shape))
+    for wrong in ([[1, 2], [3]], "mask.png", np.ones((100, 200, 3), np.uint8)):
+        for call in (lambda mask: rollcli.estimate_pair(image, image, mask=mask), masked_roll):
+            with pytest.raises(rollcli.UsageError, match="a mask is a 2-D array"):
+                call(wrong)
+
+
+def masked_roll(mask):
+    return rollcli.estimate_roll(typed_client.road(0.1), mask=mask)
+
+
+def test_numbers_and_rows_of_numpy_are_taken_or_refused_in_words():
+    left, right = (cv2.imread(f"{ROOT}/sample_data/{side}/frame_0001.png", 0) for side in ("left", "right"))
+    given = [rollcli.compute_disparity(left, right, vertical_offset=each) for each in (1, np.int64(1))]
+    assert np.array_equal(*given)
+    with pytest.raises(rollcli.InputError, match="the left image is no array of pixels"):
+        rollcli.compute_disparity(left[0], right[0])
+    with pytest.raises(rollcli.UsageError, match="what is of type ndarray is no calibration"):
+        rollcli.estimate_roll(typed_client.road(0.1), calibration=left)
 
 
 def test_what_a_masked_array_hides_is_no_data(disparity):

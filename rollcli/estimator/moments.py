@@ -61,7 +61,7 @@ class CheckedMap:
             raise UsageError(
                 f"a disparity map is a 2-D array of real numbers, not {values.ndim}-D {values.dtype}"
             )
-        usable = None if mask is None else np.asarray(mask) != 0
+        usable = usable_of(mask)
         if usable is not None and usable.shape != values.shape:
             here, there = ("x".join(map(str, each.shape[::-1])) for each in (usable, values))
             raise UsageError(f"the mask is {here}, the map {there}: give a mask of the map's size")
@@ -89,6 +89,25 @@ def map_of(disparity: ArrayLike | None) -> NDArray[Any]:
         return np.asarray(disparity)
     except (TypeError, ValueError) as error:
         raise UsageError(f"a disparity map is a 2-D array of real numbers: {error}") from error
+
+
+def usable_of(mask: ArrayLike | None) -> NDArray[np.bool_] | None:
+    """Return which pixels a mask lets be used; None where there is no mask.
+
+    Raises
+    ------
+    UsageError
+        It is no 2-D array of numbers.
+    """
+    if mask is None:
+        return None
+    try:
+        usable: NDArray[np.bool_] = np.asarray(mask) != 0
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"a mask is a 2-D array of numbers: {error}") from error
+    if usable.ndim != 2:
+        raise UsageError(f"a mask is a 2-D array of numbers, not {usable.ndim}-D")
+    return usable
 
 
 def strips(height: int, rows: int) -> list[slice]:

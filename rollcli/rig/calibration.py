@@ -208,7 +208,8 @@ def require_calibration(calibration: object) -> None:
     UsageError
     """
     if calibration is not None and not isinstance(calibration, Calibration):
-        raise UsageError(f"{calibration!r} is no calibration: give rollcli.read_calibration(path)")
+        kind = type(calibration).__name__
+        raise UsageError(f"what is of type {kind} is no calibration: give rollcli.read_calibration(path)")
 
 
 def _one_factor(width: int, of_width: int, height: int, of_height: int) -> bool:

@@ -4,13 +4,12 @@ import os
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import EstimationError, UsageError
 from rollcli.estimator import estimate as estimator
 from rollcli.estimator.estimate import RollEstimate
-from rollcli.estimator.moments import map_of
+from rollcli.estimator.moments import map_of, usable_of
 from rollcli.estimator.request import DEFAULT_REQUEST, LearningRate, Request
 from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import Stored
@@ -181,6 +180,7 @@ def estimate_pair(
 
     Examples
     --------
+    >>> import numpy as np
     >>> rng = np.random.default_rng(0)
     >>> right = rng.integers(0, 256, (120, 320), dtype=np.uint8)
     >>> rows = [np.roll(row, 10 + v // 8) for v, row in enumerate(right)]
@@ -189,8 +189,8 @@ def estimate_pair(
     """
     request = Request(method, model, road, lambda0, tolerance, max_roll, max_interval, seed=seed)
     rig = given_calibration(calibration)
-    allowed = None if mask is None else np.asarray(mask) != 0
-    if allowed is not None and not (allowed.ndim == 2 and allowed.any()):
+    allowed = usable_of(mask)
+    if allowed is not None and not allowed.any():
         raise UsageError("the mask leaves no pixel of the map: give an array that is not all zero")
     source = matched_source(left, right, stereo or StereoOptions(), wanted_of(allowed, request))
     if rig is not None:

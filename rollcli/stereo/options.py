@@ -78,7 +78,7 @@ class StereoOptions:
     def given_alignment(self, width: int) -> Correction:
         """Return how the right view lies as the user says, of views so wide."""
         if self.vertical_offset is not None or self.align in ALIGN:
-            return Correction(Misalignment(self.vertical_offset or 0.0), None, 0.0, width)
+            return Correction(Misalignment(float(self.vertical_offset or 0)), None, 0.0, width)
         return read_correction(self.align).resized(width)
 
     @property

@@ -33,7 +33,7 @@ def prepare_views(left: NDArray[Any], right: NDArray[Any]) -> Views:
         An image is None, or of a kind that cannot be matched, or they differ in size.
     """
     for side, image in (("left", left), ("right", right)):
-        if not isinstance(image, np.ndarray):
+        if not isinstance(image, np.ndarray) or image.ndim < 2:
             reason = "is None: it was not read" if image is None else "is no array of pixels"
             raise InputError(f"the {side} image {reason}")
     if left.shape[:2] != right.shape[:2]:
