@@ -29,7 +29,8 @@ def match_paths(names: Sequence[str], rows: Sequence[str], table: str) -> list[i
         Paths with "/" separators.
     rows : sequence of str
         The paths that the rows of a table are about. They need not exist here, and their endings may differ:
-        the same stem is a match. Of several, the one with the most equal folders before it.
+        the same stem is a match. Of several, the one with the most equal folders before it, and of these
+        the one with the same ending.
     table : str
         What errors call the table.
 
@@ -48,6 +49,9 @@ def match_paths(names: Sequence[str], rows: Sequence[str], table: str) -> list[i
     owner: dict[int, str] = {}
     for name in names:
         best = _closest(_parts(name), by_end)
+        if len(best) > 1:  # of files of one name, that with the same ending
+            ending = PurePosixPath(name).suffix
+            best = [at for at in best if PurePosixPath(rows[at]).suffix == ending] or best
         if len(best) > 1:
             raise UsageError(f"{table}: more than one row fits {name}: {listed(rows[at] for at in best)}")
         found.append(best[0] if best else None)
