@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING, NamedTuple, overload
 from rollcli.errors import InputError, UsageError
 from rollcli.extras import require_extra
 from rollcli.files.atomic import is_file
-from rollcli.files.containers import BAGS, VIDEOS, bag_files, file_of, frame_name, is_rest, is_video
+from rollcli.files.containers import (
+    BAGS,
+    VIDEOS,
+    bag_files,
+    file_of,
+    frame_name,
+    is_archive,
+    is_rest,
+    is_video,
+)
 from rollcli.files.inputs import Manifest, find_inputs, named_input, pair_inputs
 from rollcli.files.naming import Input, gathered
 from rollcli.files.search import IMAGE_ENDINGS, LEAVE_NONE, MAP_ENDINGS, Search, is_place, objects_behind
@@ -130,10 +139,10 @@ class Masks:
 
     def __init__(self, mask: str | None) -> None:
         self._mask, self._by_stem = mask, None
-        if mask is not None and is_place(mask):
+        if mask is not None and (is_place(mask) or is_archive(mask)):
             found = find_inputs([mask], Search(recursive=True))
             self._by_stem = gathered((Path(frame_name(each.name)).stem, each.location) for each in found)
-        elif mask is not None and not (is_url(mask) or is_file(mask)):
+        elif mask is not None and not (is_url(mask) or is_file(file_of(mask))):
             raise UsageError(f"{mask}: no such mask file or folder")
 
     def of(self, name: str) -> str | None:

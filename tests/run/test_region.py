@@ -1,11 +1,14 @@
 """The pixels that --roi, --polygon and --mask allow."""
 
+import zipfile
+
 import numpy as np
 import pytest
 
 from rollcli.estimator.request import Request
 from rollcli.run.options import FrameOptions, RegionOptions
 from rollcli.run.read import region_mask, wanted_of
+from tests.run_cli import rollcli, write_kitti, write_maps
 
 SHAPE = (120, 160)
 
@@ -45,3 +48,19 @@ def test_of_a_pair_the_road_is_found_in_the_region():
     small[v < 15] = small[v >= 50] = 0  # nothing in the region is no data
     assert wanted.road(small) == pytest.approx((12, 0.05, 0.4), abs=1e-3)
     assert wanted.road(np.where(u < 41, left, 0)) is None
+
+
+def test_masks_in_an_archive_are_those_of_a_folder(tmp_path):
+    write_maps(tmp_path / "maps", 2)
+    with zipfile.ZipFile(tmp_path / "masks.zip", "w") as archive:
+        for number, place in enumerate((20, -20)):
+            path = tmp_path / "masks" / f"frame{number}.png"
+            write_kitti(path, np.eye(*SHAPE, place) + np.eye(*SHAPE, place // 2))
+            archive.write(path, path.name)
+    one, each, packed = (
+        rollcli("estimate", "maps", "--road", "all", "-q", "--mask", mask, cwd=tmp_path).out
+        for mask in ("masks.zip#frame1.png", "masks", "masks.zip")
+    )
+    assert packed == each
+    assert one.splitlines()[1] != each.splitlines()[1]
+    assert one.splitlines()[2] == each.splitlines()[2]
