@@ -222,7 +222,7 @@ _turns = _numbers(  # at most 1000 angles
 )
 WIDE_SPAN = Parsed("A:B", _numbers(":", lambda low, high: low < high), "A:B with A < B, such as -0.1:0.1")
 ANY_NUMBER = Parsed("VALUE", _any_number, "a number")  # that a pixel may hold: also nan and inf
-ROI = Parsed("X0,Y0,X1,Y1", _box, "X0,Y0,X1,Y1 in whole pixels with X0 < X1 and Y0 < Y1")
+ROI = Parsed("X0,Y0,X1,Y1", _box, "X0,Y0,X1,Y1 in whole pixels with 0 <= X0 < X1 and 0 <= Y0 < Y1")
 POINT = Parsed("CX,CY", _point, "CX,CY in pixels, such as 609.6,172.9")
 POLYGON = Parsed(
     "'X,Y X,Y X,Y …'",
