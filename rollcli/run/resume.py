@@ -498,7 +498,8 @@ def _differences(kept: KeptRows, was: Mapping[str, Any] | None, record: RunRecor
     if kept.mismatch:
         yield f"the inputs differ: {kept.mismatch}{hint}"
     if kept.count > len(frames):
-        yield f"it has {kept.count} rows, and there are {len(frames)} frames"
+        how = "" if plan.in_parts else "; --update leaves out the rows of frames that are gone"
+        yield f"it has {kept.count} rows, and there are {len(frames)} frames{how}"
     inputs_was, inputs_now = was["inputs"], now["inputs"]
     if inputs_was.get("frames") != inputs_now["frames"]:
         yield f"it was begun with {inputs_was.get('frames')} frames, now there are {inputs_now['frames']}"
