@@ -102,7 +102,8 @@ def usable_of(mask: ArrayLike | None) -> NDArray[np.bool_] | None:
     if mask is None:
         return None
     try:
-        usable: NDArray[np.bool_] = np.asarray(mask) != 0
+        values = np.asarray(mask)
+        usable: NDArray[np.bool_] = (values > 0) | (values < 0)  # not where it is NaN
     except (TypeError, ValueError) as error:
         raise UsageError(f"a mask is a 2-D array of numbers: {error}") from error
     if usable.ndim != 2:

@@ -169,14 +169,23 @@ def decode_image(data: bytes, name: str) -> NDArray[Any]:
 
 
 def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:
-    """Decode a mask, from a map or a lossless picture: True where any colour is non-zero; shape (H, W)."""
+    """Decode a mask, from a map or a lossless picture: True where any colour is non-zero; shape (H, W).
+
+    Raises
+    ------
+    InputError
+        No such file, truncated or damaged.
+    """
     if data.startswith(png.SIGNATURE):
         pixels = png.picture(data, name, mask=True)
     elif data.startswith(pictures.LOSSLESS):
         pixels = pictures.decode_picture(data, name)
+    elif data.startswith(pictures.SIGNATURES):
+        raise InputError(f"{name}: is a JPEG, whose black is not all 0: save the mask as PNG")
     else:
         pixels = _decoded(data, name).values
-    mask: NDArray[np.bool_] = (pixels if pixels.ndim == 2 else pixels.max(axis=2)) != 0
+    values = pixels if pixels.ndim == 2 else pixels.max(axis=2)
+    mask: NDArray[np.bool_] = (values > 0) | (values < 0)  # not where it is NaN, as maps have no data
     return mask
 
 

@@ -47,7 +47,7 @@ def estimate_roll(
     calibration : Calibration or path, optional
         Of the rectified left view, at the map's size or at another one; see `read_calibration`.
     mask : array_like, shape (H, W), optional
-        Non-zero where a pixel may be used.
+        Neither 0 nor NaN where a pixel may be used.
     method : {"gd", "gss", "exact", "plane", "areas"}
         The solver: gradient descent, golden section search, the global minimum; or one plane, many areas.
     model : {"parabola", "line"}
@@ -158,7 +158,8 @@ def estimate_pair(
     calibration : Calibration or path, optional
         Of the rectified left image; see `read_calibration`.
     mask : array_like, optional
-        Non-zero where a pixel may be used; of the shape that is matched at: (H, W) over `stereo.downscale`.
+        Neither 0 nor NaN where a pixel may be used; of the shape that is matched at: (H, W) over
+        `stereo.downscale`.
     stereo : StereoOptions, optional
         How the pair is matched; by default as the command does.
     method, model, road, lambda0, tolerance, max_roll, max_interval, seed, road_mask

@@ -5,6 +5,7 @@ import zipfile
 import numpy as np
 import pytest
 
+from rollcli.estimator.moments import usable_of
 from rollcli.estimator.request import Request
 from rollcli.run.options import FrameOptions, RegionOptions
 from rollcli.run.read import region_mask, wanted_of
@@ -64,3 +65,12 @@ def test_masks_in_an_archive_are_those_of_a_folder(tmp_path):
     assert packed == each
     assert one.splitlines()[1] != each.splitlines()[1]
     assert one.splitlines()[2] == each.splitlines()[2]
+
+
+def test_what_is_no_number_in_a_mask_is_not_used(tmp_path):
+    v, _ = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    values = np.where(v > 30, -1.0, np.where(v > 10, np.nan, 0))
+    np.save(tmp_path / "mask.npy", values)
+    found = region_mask(str(tmp_path / "mask.npy"), FrameOptions(), SHAPE)
+    np.testing.assert_array_equal(found, v > 30)
+    np.testing.assert_array_equal(usable_of(values), v > 30)
