@@ -82,7 +82,7 @@ def read_truth(path: str | Path) -> dict[str, KnownPose]:
 
 def _rows(text: str, path: str | Path) -> Iterator[tuple[str, KnownPose]]:
     """Yield each line's name, and what it says of the rig."""
-    lines = csv.DictReader(io.StringIO(text, newline=""), strict=True)
+    lines = csv.DictReader(io.StringIO(text, newline=""), strict=True, skipinitialspace=True)
     try:
         missing = [name for name in _NEEDED if name not in (lines.fieldnames or ())]
         if missing:
