@@ -256,10 +256,8 @@ def _heights_of_row(source: Source, frame: Frame, options: HeightsOptions, paths
     return dict(zip(paths, files, strict=True)), dict(source.warnings)
 
 
-def _matched(source: Source, of: Frame, options: DisparityOptions, paths: Sequence[str]) -> _Made:
+def _matched(source: Source, _: Frame, options: DisparityOptions, paths: Sequence[str]) -> _Made:
     """Encode the disparity map of the pair, and draw it if that was requested."""
-    if not np.any(source.disparity):
-        raise InputError(f"{of.file}: no pixel could be matched with the right image")
     path, data = encode_computed(paths[0], source.shown, options.save_as, source.text)
     files = {path: data}
     if options.preview is not None:

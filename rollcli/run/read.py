@@ -209,6 +209,8 @@ def _match(frame: Frame, options: FrameOptions) -> Source:
     allowed = region_mask(frame.mask, options, matched_shape(left.shape, options.stereo.downscale))
     wanted = wanted_of(allowed, options.method.request(), whole=bool(options.images.folders()))
     source = matched_source(left, right, options.stereo, wanted)
+    if not np.any(source.disparity):
+        raise InputError(f"{frame.file}: no pixel could be matched with the right image")
     return replace(source, photo=left if options.images.needs_photo else None, allowed=allowed)
 
 
