@@ -41,6 +41,8 @@ class Jackknife:
     uneven : float
         How far the road's patches lie over or under its parabola, root mean square, over the width of the
         view where it is nearest: an angle, radians.
+    width : float
+        Of the view where the road is nearest, camera heights.
     bend : float
         By how much the camber that was fitted moves theta.
     camber : float or None
@@ -53,6 +55,7 @@ class Jackknife:
     white: Floats
     freedom: tuple[float, float]
     uneven: float
+    width: float
     bend: float
     camber: float | None
 
@@ -96,7 +99,8 @@ def interval_of(jackknife: Jackknife, theta: float, turned: float, tuning: Inter
     """
     noise = tuning.factor * noise_of(jackknife, theta, tuning)
     uneven, bend = tuning.uneven * jackknife.uneven, tuning.bend * jackknife.bend
-    half_width = math.hypot(noise, uneven, bend, _NORMAL * turned)
+    farther = tuning.twist * math.sqrt(max(0.0, jackknife.width - tuning.near))
+    half_width = math.hypot(noise, uneven, bend, farther, _NORMAL * turned)
     return Interval(min(noise, math.pi / 2), min(half_width, math.pi / 2))
 
 
@@ -148,6 +152,7 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
     uneven = _unevenness(heights, leverage, quarter, tuning.groups, tuning.levelled)
     cosine, sine, grid = abs(math.cos(theta)), abs(math.sin(theta)), surface.grid
     view = 2 * (grid.centre_u * cosine + grid.centre_v * sine) / grid.scale  # how wide it is across the road
+    width = view * abs(model.alpha[1]) / nearest
 
     total = bands.sum(0)
     inverse, whole, changes, bulge = _solved(total, np.concatenate([bands, columns]), prior)
@@ -162,7 +167,8 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
         columns=changes[tuning.groups :, :_CAMBER],
         white=white[:4, :4],
         freedom=(_freedom(bands), _freedom(columns)),
-        uneven=uneven / (view * abs(model.alpha[1]) / nearest),
+        uneven=uneven / width,
+        width=width,
         bend=abs(model.camber * float(bulge[_THETA])),
         camber=_camber(model, prior_share, changes[:, _CAMBER]) if cambered else None,
     )

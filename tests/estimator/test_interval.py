@@ -1,12 +1,15 @@
 """The interval holds the truth as often as it says; jackknife and tangent are those of least squares."""
 
+import csv
 import dataclasses
 import math
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
+from rollcli import read_disparity
 from rollcli.errors import UsageError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.interval import Interval, Jackknife, interval_of, jackknife, touch
@@ -21,6 +24,7 @@ from rollcli.simulate.spec import FrameSpec
 from tests.estimator.synthetic_maps import bent_road, energy_of, flat_road
 from tests.true_disparity import true_disparity
 
+SWEEPS = Path(__file__).parents[2].parent / "shared" / "lidar" / "sweep"
 SIZE = {"width": 320, "height": 240, "focal": 280.0}
 
 
@@ -75,6 +79,19 @@ def test_on_rough_roads_they_hold_the_roll_of_the_lane_that_a_lidar_would_say():
     assert np.mean(held) >= 0.95 - 3 * math.sqrt(0.95 * 0.05 / 28)
 
 
+@pytest.mark.skipif(not SWEEPS.is_dir(), reason="no lidar sweeps at ../shared/lidar")
+def test_where_the_nearest_road_is_hidden_they_hold_the_roll_of_the_lane_from_the_rig_on():
+    reference, held = SWEEPS.parent / "reference.csv", []
+    for row in csv.DictReader(reference.read_text().splitlines()):
+        sweep = read_disparity(SWEEPS / f"{row['frame']}.png")
+        for hidden in (45, 75):
+            sweep[-hidden:] = 0
+            found = estimate_roll(sweep)
+            low, high = float(row["lo_deg"]), float(row["hi_deg"])
+            held.append(low - found.roll_ci95_deg <= found.roll_deg <= high + found.roll_ci95_deg)
+    assert np.mean(held) >= 0.95 - 3 * math.sqrt(0.95 * 0.05 / 41)
+
+
 @pytest.mark.parametrize("roll_deg", [-50, 0, 30])
 def test_a_slope_that_all_disparities_may_have_widens_it_by_what_it_would_turn(roll_deg):
     """Maps that have such a slope show what it turns: that is the standard deviation that is added."""
@@ -102,7 +119,7 @@ def test_a_slope_error_that_is_none_is_refused(slope_error):
 def knife(bands=(0.0,), columns=(0.0,), white=0.0, freedom=(5.0, 5.0), **parts):
     """A jackknife whose groups change theta alone."""
     changes = [np.array([[0, 0, 0, change] for change in group]) for group in (bands, columns)]
-    others = {"uneven": 0.0, "bend": 0.0, "camber": None} | parts
+    others = {"uneven": 0.0, "width": 0.0, "bend": 0.0, "camber": None} | parts
     return Jackknife(*changes, np.diag([0, 0, 0, white]), freedom, **others)
 
 
@@ -119,12 +136,12 @@ def test_groups_widen_it_as_students_t_does(freedom):
 
 
 def test_its_parts_add_as_independent_errors_do():
-    tuning = IntervalTuning(white=0.5, factor=2.0, uneven=5.0, bend=7.0, slant=0.4)
-    one = knife((0.03,), (0.04,), 0.0009, (12.0, 12.0), uneven=0.02, bend=0.03)
+    tuning = IntervalTuning(white=0.5, factor=2.0, uneven=5.0, near=4.0, twist=0.05, bend=7.0, slant=0.4)
+    one = knife((0.03,), (0.04,), 0.0009, (12.0, 12.0), uneven=0.02, width=8.0, bend=0.03)
     found = interval_of(one, math.radians(-30), 0.2, tuning)
     noise = 2 * (1 + 0.4 * 0.5) * math.hypot(2.179 * 0.03, 2.179 * 0.04, 0.5 * 1.96 * 0.03)
     assert found.noise == pytest.approx(noise)
-    assert found.half_width == pytest.approx(math.hypot(noise, 0.1, 0.21, 1.96 * 0.2))
+    assert found.half_width == pytest.approx(math.hypot(noise, 0.1, 0.05 * 2, 0.21, 1.96 * 0.2))
 
 
 def test_no_interval_is_wider_than_all_rolls():
@@ -273,7 +290,7 @@ def test_errors_have_the_covariance_that_those_of_the_parabola_imply(size):
     rng = np.random.default_rng(5)
     bands, columns, roots = (size * rng.normal(size=shape) for shape in ((6, 4), (6, 4), (4, 4)))
     white = roots @ roots.T
-    errors = Jackknife(bands, columns, white, (3.0, 5.0), 0.0, 0.0, None)
+    errors = Jackknife(bands, columns, white, (3.0, 5.0), 0.0, 0.0, 0.0, None)
     tangent = touch((30.0, 0.3, 1e-5), THETA, GRID, None, errors)
     # by hand: (a0, a1, a2, theta) are independent sums of all groups, and of the textbook's 95 % half-widths
     covariance = bands.T @ bands + columns.T @ columns + 1.96**2 * white
