@@ -41,8 +41,9 @@ class Jackknife:
     uneven : float
         How far the road's patches lie over or under its parabola, root mean square, over the width of the
         view where it is nearest: an angle, radians.
-    width : float
-        Of the view where the road is nearest, camera heights.
+    hidden : float
+        By how much wider the view is where the road is nearest than at the map's lower border, camera
+        heights.
     bend : float
         By how much the camber that was fitted moves theta.
     camber : float or None
@@ -55,7 +56,7 @@ class Jackknife:
     white: Floats
     freedom: tuple[float, float]
     uneven: float
-    width: float
+    hidden: float
     bend: float
     camber: float | None
 
@@ -99,8 +100,8 @@ def interval_of(jackknife: Jackknife, theta: float, turned: float, tuning: Inter
     """
     noise = tuning.factor * noise_of(jackknife, theta, tuning)
     uneven, bend = tuning.uneven * jackknife.uneven, tuning.bend * jackknife.bend
-    farther = tuning.twist * math.sqrt(max(0.0, jackknife.width - tuning.near))
-    half_width = math.hypot(noise, uneven, bend, farther, _NORMAL * turned)
+    hidden = tuning.twist * jackknife.hidden
+    half_width = math.hypot(noise, uneven, bend, hidden, _NORMAL * turned)
     return Interval(min(noise, math.pi / 2), min(half_width, math.pi / 2))
 
 
@@ -153,6 +154,10 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
     cosine, sine, grid = abs(math.cos(theta)), abs(math.sin(theta)), surface.grid
     view = 2 * (grid.centre_u * cosine + grid.centre_v * sine) / grid.scale  # how wide it is across the road
     width = view * abs(model.alpha[1]) / nearest
+    # where the middle of the lane leaves what was looked at
+    side = grid.centre_u / grid.scale
+    leaves = min(surface.lowest / max(cosine, _LEAST_SPAN), side / max(sine, _LEAST_SPAN))
+    border = model.disparity_along(leaves)
 
     total = bands.sum(0)
     inverse, whole, changes, bulge = _solved(total, np.concatenate([bands, columns]), prior)
@@ -168,7 +173,7 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
         white=white[:4, :4],
         freedom=(_freedom(bands), _freedom(columns)),
         uneven=uneven / width,
-        width=width,
+        hidden=max(0.0, width - width * nearest / max(border, nearest)),
         bend=abs(model.camber * float(bulge[_THETA])),
         camber=_camber(model, prior_share, changes[:, _CAMBER]) if cambered else None,
     )

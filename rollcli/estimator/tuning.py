@@ -125,14 +125,10 @@ class IntervalTuning:
         By how much noise falls from a quarter of a patch to the whole: by 4 where neighbours share none of
         it. With 4 the intervals of smooth rendered roads are half as wide again; with 2, 0.86 of the rough
         ones and 0.85 of the sweeps are covered.
-    near : float
-        Camera heights that the view is wide, beyond which the nearest pixels of the road are far ahead:
-        bonnets and borders hide the others. Whole views of real roads are 5 to 7 wide there.
     twist : float
-        By how much the lane turns along the road, radians per root of a camera height beyond `near`. On 41
-        lidar sweeps and pairs whose lower 15 to 120 rows are hidden, angles spread by 0.13 to 0.4 degrees
-        around those of the lane; fitted to half of them it is 0.0037 and 0.0065. Without it 0.44 to 0.85 of
-        those without the lower 45 rows or more are covered in place of 0.90 to 1.
+        By how much the lane turns between the lower border and the nearest pixel of the road that is seen:
+        radians per camera height that the view is wider there. Fitted to one half of 41 lidar sweeps and as
+        many pairs, without their lower 30 to 120 rows, it is 0.0021 or 0.0030.
     bend : float
         Of the angle by which the camber moves theta: a crown is no exact parabola.
     slant : float
@@ -145,8 +141,7 @@ class IntervalTuning:
     factor: float = 0.65
     uneven: float = 10.0
     levelled: float = 2.5
-    near: float = 6.5
-    twist: float = 0.0047
+    twist: float = 0.0026
     bend: float = 2.75
     slant: float = 1.0
 

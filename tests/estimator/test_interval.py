@@ -119,7 +119,7 @@ def test_a_slope_error_that_is_none_is_refused(slope_error):
 def knife(bands=(0.0,), columns=(0.0,), white=0.0, freedom=(5.0, 5.0), **parts):
     """A jackknife whose groups change theta alone."""
     changes = [np.array([[0, 0, 0, change] for change in group]) for group in (bands, columns)]
-    others = {"uneven": 0.0, "width": 0.0, "bend": 0.0, "camber": None} | parts
+    others = {"uneven": 0.0, "hidden": 0.0, "bend": 0.0, "camber": None} | parts
     return Jackknife(*changes, np.diag([0, 0, 0, white]), freedom, **others)
 
 
@@ -136,8 +136,8 @@ def test_groups_widen_it_as_students_t_does(freedom):
 
 
 def test_its_parts_add_as_independent_errors_do():
-    tuning = IntervalTuning(white=0.5, factor=2.0, uneven=5.0, near=4.0, twist=0.05, bend=7.0, slant=0.4)
-    one = knife((0.03,), (0.04,), 0.0009, (12.0, 12.0), uneven=0.02, width=8.0, bend=0.03)
+    tuning = IntervalTuning(white=0.5, factor=2.0, uneven=5.0, twist=0.05, bend=7.0, slant=0.4)
+    one = knife((0.03,), (0.04,), 0.0009, (12.0, 12.0), uneven=0.02, hidden=2.0, bend=0.03)
     found = interval_of(one, math.radians(-30), 0.2, tuning)
     noise = 2 * (1 + 0.4 * 0.5) * math.hypot(2.179 * 0.03, 2.179 * 0.04, 0.5 * 1.96 * 0.03)
     assert found.noise == pytest.approx(noise)

@@ -85,6 +85,8 @@ class Sample:
     reach : int
         How far away neighbours are, and the border at least, px.
     spacing : Spacing
+    lowest : float
+        The y of the lowest row that is looked at.
     """
 
     grid: Grid
@@ -103,6 +105,7 @@ class Sample:
     usable: NDArray[np.bool_] | None
     reach: int
     spacing: Spacing
+    lowest: float
 
 
 def take_sample(
@@ -176,6 +179,7 @@ def take_sample(
         usable=usable,
         reach=reach,
         spacing=spacing,
+        lowest=float(down[-1]),
     )
 
 

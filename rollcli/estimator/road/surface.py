@@ -76,6 +76,8 @@ class Surface:
         What the prior of the camber adds to its normal equation; infinite where none was fitted.
     limit : float
         How far single pixels of the road are off it at most, tolerances.
+    lowest : float
+        The y of the lowest row that was looked at.
     """
 
     x: Floats
@@ -91,6 +93,7 @@ class Surface:
     level: Floats | None = None
     camber_precision: float = math.inf
     limit: float = math.inf
+    lowest: float = 0.0
 
     def covers(self, disparity: NDArray[Any], tuning: Tuning) -> NDArray[np.bool_]:
         """Return which pixels of a map (H, W) lie on the surface and rise as it does."""
@@ -180,6 +183,7 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool, tuning: Tuning) 
         level=level,
         camber_precision=camber_precision,
         limit=limit,
+        lowest=sample.lowest,
     )
 
 
