@@ -66,6 +66,8 @@ def doubts_of(
             yield f"a camera that looks down so far sees more of a road than {share}"
         if ground.below > tuning.most_below:
             yield "the plane ends near ahead, as a table does: what is seen there lies below it"
+        if ground.farther < tuning.least_farther:
+            yield "the plane is seen near ahead alone, as a dashboard is"
         if ground.beyond < tuning.least_beyond:
             yield "the plane is closed off near ahead, as the floor of a room is"
     if road and road.rival > tuning.rival_share * road.score:
@@ -94,12 +96,16 @@ class _Ground(NamedTuple):
         more are on it.
     beyond : float
         Of the pixels with data from the reach to twice as far, those on the plane; 1 where few have data.
+    farther : float
+        Of the pixels on the plane, those more than twice as far away as it is at the lower border; 1 where
+        the upper border, or a mask, lets few be seen.
     """
 
     width: float
     filled: float
     below: float
     beyond: float
+    farther: float
 
 
 def _ground_of(checked: CheckedMap, surface: Surface, rmse: float, reach: float) -> _Ground:
@@ -149,9 +155,16 @@ def _ground_of(checked: CheckedMap, surface: Surface, rmse: float, reach: float)
     begins = max(at_reach, 2 * farthest / nearest)
     ahead = (near < begins) & (near > begins / 2)
     seen = valid & ahead
+    ground = road > 0 if checked.usable is None else (road > 0) & checked.usable[::step, ::step]
+    farther = ground & (near < 0.5)
     return _Ground(
         width=wide,
         filled=float(on_road.sum()) / max(1.0, float(valid.sum())),
         below=float(np.max(lower[some] / in_lane[some], initial=0)),
         beyond=float(on_road[seen].mean()) if seen.sum() > _ENOUGH * ahead.sum() else 1.0,
+        farther=(
+            float(on_road[farther].sum()) / max(1.0, float(on_road[ground].sum()))
+            if farther.sum() > _ENOUGH * ground.sum()
+            else 1.0
+        ),
     )

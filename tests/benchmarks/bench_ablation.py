@@ -59,6 +59,7 @@ OFF = {
     "doubts.filled_by_horizon": -1.0,
     "doubts.most_below": 1e6,
     "doubts.least_beyond": -1.0,
+    "doubts.least_farther": -1.0,
     "doubts.rival_share": 1e6,
     "doubts.longest_move": 1e6,
     "doubts.bound_share": 1e6,

@@ -1,4 +1,4 @@
-"""How many scenes without a road are called ok: rooms, tables, boards, shelves, stairs, flying boxes.
+"""How many scenes without a road are called ok: rooms, tables, boards, shelves, stairs, cars' insides.
 
     python tests/benchmarks/bench_roadless.py [FRAMES [SEED]]
 
@@ -24,7 +24,7 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
 
 # a scene depends on its kind's place here
-KINDS = ("room", "table", "board", "boxes", "shelf", "desk", "stairs", "books", "robot")
+KINDS = ("room", "table", "board", "boxes", "shelf", "desk", "stairs", "books", "robot", "car")
 
 Array = NDArray[np.float64]
 Rectangle = tuple[Array, Array, Array]  # a corner and two edges, camera coordinates: right, down, ahead
@@ -236,6 +236,27 @@ def _robot(rng: np.random.Generator) -> Iterator[Rectangle]:
             yield corner + place, one, other
 
 
+def _car(rng: np.random.Generator) -> Iterator[Rectangle]:
+    """Yield the inside of a car: seats and a dashboard, and through the window above it nothing."""
+    rotation, ahead, rise = _tilt(rng, (-5, 25), 5), rng.uniform(0.5, 0.9), rng.uniform(0, 0.15)
+    wide = rotation @ np.array([1.5, 0, 0])
+    for corner, edge in (
+        ((-0.75, 0.25, ahead), (0.0, -rise, 0.5)),  # the dashboard, and its front
+        ((-0.75, 0.25, ahead), (0.0, 0.5, -0.1)),
+        ((-0.75, 0.75, -1.0), (0.0, 0.0, 1.8)),  # the floor, and the roof
+        ((-0.75, -0.3, -1.0), (0.0, 0.0, 1.3)),
+    ):
+        yield rotation @ np.array(corner), wide, rotation @ np.array(edge)
+    for side in (-0.75, 0.75):
+        door = np.array([side, 0.1, -1]), np.array([0, 0, 2.0]), np.array([0, 1.0, 0])
+        first, second, third = (rotation @ each for each in door)
+        yield first, second, third
+    for left in (-0.65, 0.15):
+        back = ahead - rng.uniform(0.45, 0.75)
+        low = np.array([left, rng.uniform(-0.1, 0.45), back])
+        yield from _box(rotation, low, np.array([left + 0.5, 0.75, back + 0.15]))
+
+
 _SCENES = {
     "room": _room,
     "table": _table,
@@ -246,6 +267,7 @@ _SCENES = {
     "stairs": _stairs,
     "books": _books,
     "robot": _robot,
+    "car": _car,
 }
 
 

@@ -58,6 +58,11 @@ def close_table():
     return with_noise(np.where(box, 70, 46 + 0.1 * (V - 240)))
 
 
+def dashboard():
+    """A car's dashboard, and through the window above it nothing."""
+    return with_noise(np.where(V > 380, road(4), 0))
+
+
 def table(roll_deg):
     """A table seen from above, with things on it, and the floor behind it."""
     y = (V - 240) * math.cos(math.radians(roll_deg)) - (U - 320) * math.sin(math.radians(roll_deg))
@@ -75,6 +80,7 @@ MAPS = {
     "the view is as narrow as that of a table": (lambda: with_noise(50 + 0.06 * (V - 240), 0.05), {}),
     "a camera that looks down so far sees more of a road": (close_table, {}),
     "the plane ends near ahead": (lambda: with_noise(np.where(V > 270, road(4), 5)), {}),
+    "the plane is seen near ahead alone": (dashboard, {}),
     "the plane is closed off near ahead": (lambda: with_noise(np.maximum(road(4), 22)), {}),
     "another plane, with another roll": (lambda: np.maximum(road(-10), road(10)), {}),
     "the road's pixels moved the roll": (twisted_road, {}),
@@ -114,6 +120,12 @@ def test_a_border_of_small_disparities_below_the_road_is_no_end_of_it(rows):
     bordered[-rows:] = 1
 
     estimate = estimate_roll(bordered)
+
+    assert (estimate.status, estimate.message) == ("ok", "")
+
+
+def test_a_mask_that_leaves_the_nearest_road_alone_is_no_end_of_it():
+    estimate = estimate_roll(with_noise(road(4)), mask=V > 380)
 
     assert (estimate.status, estimate.message) == ("ok", "")
 
