@@ -23,6 +23,7 @@ _ON_ROAD = 0.03  # of the road's disparity, within which a pixel is on it
 _BELOW = 0.15  # of the road's disparity, by which a pixel is below it
 _FEW = 8  # pixels of the lane in a band: fewer tell nothing
 _ENOUGH = 0.1  # of the pixels ahead that have data: fewer tell nothing
+_AT_BOUND = 0.99  # of the largest roll: a search ends a little before it
 
 
 def doubts_of(
@@ -74,7 +75,7 @@ def doubts_of(
         yield "another plane, with another roll, explains the map nearly as well"
     if surface and surface.moved > tuning.longest_move:
         yield f"the road's pixels moved the roll by {math.degrees(surface.moved):.1f} degrees"
-    if road and surface and abs(surface.model.theta) > tuning.bound_share * request.max_roll:
+    if road and surface and abs(surface.model.theta) > _AT_BOUND * request.max_roll:
         yield "the roll is at its bound, --max-roll"
     if interval and interval.noise > tuning.noise_share * request.max_interval:
         yield f"noise and unevenness leave the angle open: ±{math.degrees(interval.noise):.2f} degrees"

@@ -185,8 +185,6 @@ class DoubtTuning:
         Share of the road's score from which another plane explains the map nearly as well.
     longest_move : float
         Radians by which the fit to the road's pixels may move the roll of its plane.
-    bound_share : float
-        Share of the largest roll from which a roll is at its bound.
     noise_share : float
         Share of the widest interval that noise alone may make. At two thirds of it six of 28 real maps that
         are right are doubted, instead of two.
@@ -203,7 +201,6 @@ class DoubtTuning:
     least_farther: float = 0.05
     rival_share: float = 0.75
     longest_move: float = math.radians(1)
-    bound_share: float = 0.99
     noise_share: float = 0.45
 
 

@@ -54,6 +54,7 @@ OFF = {
     "fit.other_roll": 1e-6,
     "fit.off_level": 1e6,
     "interval.white": 0.0,
+    "interval.twist": 0.0,
     "interval.slant": 0.0,
     "doubts.near_minimum": 0.0,
     "doubts.filled_by_horizon": -1.0,
@@ -62,7 +63,6 @@ OFF = {
     "doubts.least_farther": -1.0,
     "doubts.rival_share": 1e6,
     "doubts.longest_move": 1e6,
-    "doubts.bound_share": 1e6,
     "doubts.noise_share": 1e6,
 }
 WORSE = ("noise", "rounded", "sparse", "bonnet", "truck", "wall")
