@@ -173,7 +173,7 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
         white=white[:4, :4],
         freedom=(_freedom(bands), _freedom(columns)),
         uneven=uneven / width,
-        hidden=max(0.0, width - width * nearest / max(border, nearest)),
+        hidden=width * (1 - nearest / max(border, nearest)),
         bend=abs(model.camber * float(bulge[_THETA])),
         camber=_camber(model, prior_share, changes[:, _CAMBER]) if cambered else None,
     )
