@@ -17,6 +17,7 @@ from rollcli.files.stores.locations import base_name, is_remote, is_url, store_o
 from rollcli.run.frame import Frame
 from rollcli.run.options import KINDS, FrameOptions, ImageKind, ImageOptions
 from rollcli.run.result_rows import frame_of_row
+from rollcli.simulate.options import TRUTH
 
 JUMP, WIDEST, SUSPECT, SPREAD = "around a jump", "widest interval", "suspect", "evenly spread"
 
@@ -199,14 +200,13 @@ def _image(kind: ImageKind, row: Row, images: _ImageFolder, recorded: ImageOptio
     return None
 
 
-_TRUTH = "truth.csv"  # beside it lie the true disparities and heights of a simulation
-_TRUE = ("disparity", "heights")
+_TRUE = ("disparity", "heights")  # beside the truth of a simulation they are not those of a run
 
 
 def _folders(kind: str, images: _ImageFolder, recorded: str | None) -> Iterator[str]:
     """Yield where images of a kind may be: in the folder named, under the name it had or the option's."""
     given = [] if recorded is None else [base_name(recorded.rstrip("/"))]
-    usual = [] if kind in _TRUE and images.find(_TRUTH) is not None else [kind]
+    usual = [] if kind in _TRUE and images.find(TRUTH) is not None else [kind]
     names = [name for name in dict.fromkeys([*given, *usual]) if name != ".."]
     for name in names:
         yield f"{name}/"

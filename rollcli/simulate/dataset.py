@@ -31,12 +31,11 @@ from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
 from rollcli.run.workers.tasks import run_tasks
 from rollcli.simulate.build import carriageway_of, render_frame, road_camber
-from rollcli.simulate.options import KERBED, MIXED, SimulateOptions
+from rollcli.simulate.options import KERBED, MIXED, TRUTH, SimulateOptions
 from rollcli.simulate.relief import lane_points, lane_rolls
 from rollcli.simulate.spec import FrameSpec, draw_specs
 
 _PARTS = ("left", "right", "disparity")
-_TRUTH = "truth.csv"
 _CALIBRATION, _HEIGHTS = "calib", "heights"
 _OURS = re.compile(r"frame_\d{4,}\.png")
 
@@ -170,9 +169,9 @@ class Dataset:
 
     def files(self) -> list[Path]:
         """List all files that are written, truth.csv last."""
-        record = [] if self.record is None else [Path(run_path(self.folder / _TRUTH))]
+        record = [] if self.record is None else [Path(run_path(self.folder / TRUTH))]
         images = (path for task in self.missing for path in task.files.values())
-        return [*record, *images, *self.calibrations(), self.folder / _TRUTH]
+        return [*record, *images, *self.calibrations(), self.folder / TRUTH]
 
 
 def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = None) -> Iterator[str]:
@@ -195,13 +194,13 @@ def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = No
         A file cannot be written, or a worker died.
     """
     if dataset.kept is None:  # pairs without a row, another rig's calibration
-        single = [dataset.folder / name for name in (_TRUTH, f"{_CALIBRATION}.txt")]
+        single = [dataset.folder / name for name in (TRUTH, f"{_CALIBRATION}.txt")]
         with writing(dataset.folder):
             for path in (*single, *_earlier_frames(dataset.folder)):
                 path.unlink(missing_ok=True)
     if dataset.record is not None:
         text = json.dumps(dataset.record, indent=2).encode() + b"\n"
-        write_atomic(run_path(dataset.folder / _TRUTH), text)
+        write_atomic(run_path(dataset.folder / TRUTH), text)
     tasks, written = dataset.missing, 0
     remove_leftovers(path for task in tasks for path in task.files.values())
     work = Work(_write_frame, _lost, lambda task: remove_leftovers(task.files.values()))
@@ -211,7 +210,7 @@ def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = No
     if written == len(tasks):
         for path, text in dataset.calibrations().items():
             write_atomic(path, text)
-        write_atomic(dataset.folder / _TRUTH, truth_csv((task.stem, task.spec) for task in dataset.tasks))
+        write_atomic(dataset.folder / TRUTH, truth_csv((task.stem, task.spec) for task in dataset.tasks))
 
 
 def _write_frame(task: RenderTask) -> str:
@@ -312,9 +311,9 @@ def _check_resumable(dataset: Dataset) -> None:
     UsageError
         Says what differs.
     """
-    name, record = str(dataset.folder), run_path(_TRUTH)
+    name, record = str(dataset.folder), run_path(TRUTH)
     try:
-        was = read_run(dataset.folder / _TRUTH)
+        was = read_run(dataset.folder / TRUTH)
     except InputError as error:
         raise not_resumable(name, f"{record} is damaged") from error
     if was is None:

@@ -18,6 +18,7 @@ CROSSFALL = (1.0, 4.0)  # per cent, of roads that are not flat: what road design
 GUTTER_WIDTH = 0.35  # metres, at each edge of the carriageway
 KERB = (0.10, 0.20)
 MAX_DIPS = 12
+TRUTH = "truth.csv"  # in the folder of a simulation, beside its true disparities and heights
 
 
 @dataclass(frozen=True, kw_only=True)
