@@ -47,7 +47,7 @@ class CheckedMap:
         disparity : array_like, shape (H, W)
             Real numbers, px; <= 0, NaN and what is beyond `LARGEST` are no data.
         mask : array_like, shape (H, W), optional
-            Non-zero where a pixel may be used.
+            Neither 0 nor NaN where a pixel may be used.
 
         Raises
         ------
@@ -61,7 +61,7 @@ class CheckedMap:
             raise UsageError(
                 f"a disparity map is a 2-D array of real numbers, not {values.ndim}-D {values.dtype}"
             )
-        usable = usable_of(mask)
+        usable = None if mask is None else usable_of(mask)
         if usable is not None and usable.shape != values.shape:
             here, there = ("x".join(map(str, each.shape[::-1])) for each in (usable, values))
             raise UsageError(f"the mask is {here}, the map {there}: give a mask of the map's size")
@@ -91,19 +91,17 @@ def map_of(disparity: ArrayLike | None) -> NDArray[Any]:
         raise UsageError(f"a disparity map is a 2-D array of real numbers: {error}") from error
 
 
-def usable_of(mask: ArrayLike | None) -> NDArray[np.bool_] | None:
-    """Return which pixels a mask lets be used; None where there is no mask.
+def usable_of(mask: ArrayLike) -> NDArray[np.bool_]:
+    """Return which pixels a mask lets be used, shape (H, W): neither 0 nor NaN.
 
     Raises
     ------
     UsageError
         It is no 2-D array of numbers.
     """
-    if mask is None:
-        return None
     try:
         values = np.asarray(mask)
-        usable: NDArray[np.bool_] = (values > 0) | (values < 0)  # not where it is NaN
+        usable: NDArray[np.bool_] = (values > 0) | (values < 0)
     except (TypeError, ValueError) as error:
         raise UsageError(f"a mask is a 2-D array of numbers: {error}") from error
     if usable.ndim != 2:

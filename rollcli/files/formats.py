@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError
+from rollcli.estimator.moments import usable_of
 from rollcli.files.codecs import arrays, pictures, png, tiff
 from rollcli.files.codecs.raw_map import Stored as Stored
 from rollcli.files.codecs.raw_map import native, require_map_shape
@@ -174,7 +175,7 @@ def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:
     Raises
     ------
     InputError
-        No such file, truncated or damaged.
+        Truncated, damaged, or a JPEG.
     """
     if data.startswith(png.SIGNATURE):
         pixels = png.picture(data, name, mask=True)
@@ -184,9 +185,7 @@ def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:
         raise InputError(f"{name}: is a JPEG, whose black is not all 0: save the mask as PNG")
     else:
         pixels = _decoded(data, name).values
-    values = pixels if pixels.ndim == 2 else pixels.max(axis=2)
-    mask: NDArray[np.bool_] = (values > 0) | (values < 0)  # not where it is NaN, as maps have no data
-    return mask
+    return usable_of(pixels if pixels.ndim == 2 else pixels.max(axis=2))
 
 
 def _check_beginning(head: bytes, size: int, name: str) -> None:

@@ -119,8 +119,7 @@ def _road(subject: Subject, source: Source | None) -> NDArray[Any] | None:
         return read_image(subject.images["road_mask"])
     if source is None or source.photo is None:
         return None
-    calibration = _calibration(subject, source.disparity)
-    request = subject.options.method.request(middle=None if calibration is None else calibration.cx)
+    request = subject.options.method.request(calibration=_calibration(subject, source.disparity))
     found = estimate_roll(source.disparity, request, mask=source.allowed, road_mask=True)
     # where options that the record does not give back led to another angle, this is not its road
     if found.road_mask is None or abs(found.theta - subject.theta) > _SAME:

@@ -56,7 +56,7 @@ def _estimate_roll(
     source: Source, options: FrameOptions, calibration: Calibration | None
 ) -> tuple[RollEstimate, str]:
     """Estimate the roll; where there is no sure angle, say what the map looks like instead."""
-    request = options.method.request(source.slope_error, None if calibration is None else calibration.cx)
+    request = options.method.request(source.slope_error, calibration)
     wanted = options.images.road_mask is not None
     try:
         estimate = estimate_roll(source.disparity, request, mask=source.allowed, road_mask=wanted)

@@ -18,7 +18,7 @@ from rollcli.estimator.request import (
     LearningRate,
     Request,
 )
-from rollcli.rig.calibration import CalibrationOptions
+from rollcli.rig.calibration import Calibration, CalibrationOptions
 from rollcli.stereo.options import StereoOptions
 
 Save = Literal["png", "tiff", "npy"]
@@ -215,12 +215,13 @@ class MethodOptions(NamedTuple):
     max_interval_deg: float = MAX_INTERVAL_DEG
     seed: int = 0
 
-    def request(self, slope_error: float = 0.0, middle: float | None = None) -> Request:
-        """Return what is asked of the estimator, in radians; the others are of the map: see `Request`."""
+    def request(self, slope_error: float = 0.0, calibration: Calibration | None = None) -> Request:
+        """Return what is asked of the estimator, in radians, for a map with this error and calibration."""
         given: dict[str, Any] = {
             name.removesuffix("_deg"): math.radians(value) if name.endswith("_deg") else value
             for name, value in self._asdict().items()
         }
+        middle = None if calibration is None else calibration.cx
         return Request(**given, slope_error=slope_error, middle=middle)
 
 
