@@ -115,7 +115,7 @@ stereo_options = record(
     option(
         "--downscale",
         Number("F", at_least=1),
-        text="Match at 1/F of the size: maps, --mask, --roi, --polygon and pixel columns are of that size.",
+        text="Match at 1/F of the size; maps, regions of them and pixel columns refer to that size.",
     ),
     option(
         "--align",
