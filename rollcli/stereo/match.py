@@ -321,7 +321,7 @@ def match_pair(
         at_end[pair.top :] &= matched[pair.top :] != pair.road.disparity
     whole = None
     if wanted.whole and wanted != _EVERYTHING._replace(whole=True):
-        whole = finished(match_for_road(levelled(corrected), whole=True))
+        whole = finished(match_for_road(pair, whole=True))
     return StereoMatch(
         disparity=finished(matched),
         whole=whole,

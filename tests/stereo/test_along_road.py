@@ -20,6 +20,7 @@ from tests.odd_views import find_road, seen_by
 from tests.true_disparity import true_disparity
 
 LIDAR = Path(__file__).parents[2].parent / "shared" / "lidar"
+needs_lidar = pytest.mark.skipif(not LIDAR.is_dir(), reason="no real pairs with lidar at ../shared/lidar")
 SPEC = FrameSpec(scene="street", roll=math.radians(4), size=(640, 480), seed=3)
 
 
@@ -81,25 +82,38 @@ def test_rendered_roads_get_the_angle_of_the_whole_match():
     assert_agree([(frame.left, frame.right) for frame in frames])
 
 
+def real_pairs(which):
+    named = sorted((LIDAR / "left").iterdir())[which]
+    return [(read_image(str(left)), read_image(str(LIDAR / "right" / left.name))) for left in named]
+
+
 @pytest.mark.slow
-@pytest.mark.skipif(not LIDAR.is_dir(), reason=f"{LIDAR} is not there")
+@needs_lidar
 def test_real_roads_get_the_angle_of_the_whole_match():
-    named = sorted((LIDAR / "left").iterdir())[::6]
-    assert_agree([(read_image(str(left)), read_image(str(LIDAR / "right" / left.name))) for left in named])
+    assert_agree(real_pairs(slice(None, None, 6)))
+
+
+def assert_map_agrees(left, right):
+    match = match_pair(left, right, StereoOptions(), ROAD)
+    request = Request(slope_error=match.slope_error)
+    along = estimate_roll(match.disparity, request)
+    whole = estimate_roll(compute_disparity(left, right), request)
+    assert abs(along.theta - whole.theta) <= along.ci95 / 2
 
 
 @pytest.mark.slow
-def test_a_map_of_everything_gives_the_angle_of_the_pair():
+@pytest.mark.parametrize("spec", draw_specs(SimulateOptions(frames=8, size=(640, 480), seed=18, grey=True)))
+def test_a_map_of_everything_gives_the_angle_of_the_pair(spec):
     """Its road is matched along the plane, too; what is beside it differs, and where nothing was found."""
-    asked = SimulateOptions(frames=8, size=(640, 480), seed=18, grey=True)
-    agree = []
-    for frame in map(render_frame, draw_specs(asked)):
-        match = match_pair(frame.left, frame.right, StereoOptions(), ROAD)
-        request = Request(slope_error=match.slope_error)
-        along = estimate_roll(match.disparity, request)
-        whole = estimate_roll(compute_disparity(frame.left, frame.right), request)
-        agree.append(abs(along.theta - whole.theta) <= along.ci95 / 2)
-    assert sum(agree) >= 7
+    frame = render_frame(spec)
+    assert_map_agrees(frame.left, frame.right)
+
+
+@pytest.mark.slow
+@needs_lidar
+def test_a_map_of_a_real_pair_gives_its_angle():
+    for pair in real_pairs(slice(1, None, 4)):
+        assert_map_agrees(*pair)
 
 
 @pytest.mark.parametrize(("lower", "clockwise_deg"), [(3.0, 0.0), (0.0, 0.4), (-1.5, -0.3)])
@@ -208,7 +222,7 @@ def test_black_borders_of_views_are_no_data_and_the_road_is_found(street, border
     assert math.degrees(estimate.theta) == pytest.approx(4, abs=0.1)
 
 
-@pytest.mark.skipif(not LIDAR.is_dir(), reason="no real pairs with lidar at ../shared/lidar")
+@needs_lidar
 def test_a_street_of_which_one_view_was_exposed_half_as_long_has_much_the_same_roll():
     left, right = (
         cv2.imread(str(LIDAR / side / "000002.png"), cv2.IMREAD_GRAYSCALE) for side in ("left", "right")
