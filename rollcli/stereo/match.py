@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import cv2
@@ -280,15 +279,11 @@ def match_pair(
 
     search, blank = Search(first, count, options), shows_nothing(views[0])
 
-    @lru_cache(maxsize=1)
-    def levelled(lies: Misalignment) -> Levelled:
-        return Levelled(views, lies, look.disparity, search, wanted.road, blank)
-
     pair: Levelled
 
     def match(lies: Misalignment) -> Map:
         nonlocal pair
-        pair = levelled(lies)
+        pair = Levelled(views, lies, look.disparity, search, wanted.road, blank)
         return match_for_road(pair)
 
     support, doubt = None, ""
