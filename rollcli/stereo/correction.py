@@ -12,7 +12,8 @@ from rollcli.stereo.misalignment import ColumnSupport, Misalignment
 
 _VALUES = ("right_lower_px", "right_clockwise_deg", "right_larger_percent", "right_twist_px")
 _OFFSET_CI95 = "right_lower_ci95_px"
-_COLUMNS = ("scale", "twist", "pitch", "slope_error")  # as of a `ColumnSupport`
+_COLUMNS = ("scale", "twist", "pitch", "slope_error", "pitch_error")  # as of a `ColumnSupport`
+_EARLIER = {"pitch_error": 0.0}  # files of before it came have none
 _REACH = 1.96  # standard errors: of an interval of 95 %
 _LARGEST = (100.0, 45.0, 50.0, 100.0)  # of each; what is more is damage
 
@@ -70,8 +71,10 @@ def read_correction(path: str) -> Correction:
             found = json.loads(read_given(path, MOST_SETTINGS))
         values = [float(found[name]) for name in _VALUES]
         width, height = int(found["width"]), int(found["height"])
-        told = found.get("columns")
-        columns = ColumnSupport(*(float(told[name]) for name in _COLUMNS)) if told is not None else None
+        columns = None
+        if found.get("columns") is not None:
+            told = _EARLIER | found["columns"]
+            columns = ColumnSupport(*(float(told[name]) for name in _COLUMNS))
         reach = found.get(_OFFSET_CI95)
         offset_error = math.inf if reach is None else float(reach) / _REACH
     except (ValueError, KeyError, TypeError, RecursionError, OverflowError) as error:

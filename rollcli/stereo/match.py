@@ -93,12 +93,16 @@ _KEPT_SPREAD = 0.15  # px
 # px per px; standard deviation of what the rows leave open of the columns. It turns a road by 0.35 degrees
 # (95 %) where the baseline is a third of the camera's height
 _OPEN_COLUMNS = 0.001
+# The same of a pitch alone, which an offset of a few pixels may be: 0.1 degrees (95 %). Offsets of less than
+# 2 px, as calibrated rigs have, leave a third of it
+_OPEN_PITCH = 0.0003
 _FURTHEST = 12.0, 0.03, 0.02  # offset, rotation and scale that no rig in use has: px, radians, share
 # the doubts of a pair: its correction was still changing when it was given up, or could not be checked; its
 # columns may be far from where they are believed to be; it is not level once it was levelled as a file says
 NOT_LEVELLED = "the views are not level, and could not be levelled"
 TOO_LITTLE = "too little can be compared to tell whether the views are level"
 NOT_TOLD_BY_ROWS = "the rows do not tell whether the right view is larger or its rows are bent: recalibrate"
+PITCH_NOT_TOLD = "the rows do not tell whether the right camera is pitched or its image shifted: recalibrate"
 CONTRADICTS = "the views do not lie as the correction says"
 
 
@@ -307,6 +311,8 @@ def match_pair(
         support = NOTHING_KNOWN if measured is None else measured.support
     if support.error > _OPEN_COLUMNS and not doubt:
         doubt = NOT_TOLD_BY_ROWS
+    if support.pitch_error > _OPEN_PITCH and not doubt:
+        doubt = PITCH_NOT_TOLD
 
     def finished(found: Map) -> Map:
         return _with_believed_columns(refined(found, views, corrected), corrected, support)

@@ -5,7 +5,7 @@ Import-light.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 _SAME = 2.0**-10  # px: two misalignments that differ by less anywhere are one
@@ -139,16 +139,19 @@ class ColumnSupport:
         Of a yaw and of a pitch, 1/pixels.
     error : float
         Standard deviation of the slope along the rows that this leaves on the road, px per px.
+    pitch_error : float
+        What of it the pitch alone leaves.
     """
 
     scale: float
     twist: float
     pitch: float
     error: float
+    pitch_error: float = 0.0
 
     def resized(self, factor: float) -> "ColumnSupport":
         """Return the same of views `factor` times as large."""
-        return ColumnSupport(self.scale, self.twist / factor, self.pitch / factor, self.error)
+        return replace(self, twist=self.twist / factor, pitch=self.pitch / factor)
 
 
 NOTHING_KNOWN = ColumnSupport(0.0, 0.0, 0.0, 0.0)
