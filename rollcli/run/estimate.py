@@ -135,8 +135,7 @@ def _run_steps(plan: Plan, output: Output, progress: Progress, stop: Stop) -> No
                     output.replace(positions, frames, batch)
                 else:
                     output.append(frames, batch)
-                left = positions if positions[0] < output.kept.count else None  # places left to these rows
-                progress.add_rows([frame.file for frame in frames], batch.figures, batch.told, left)
+                progress.add_rows([frame.file for frame in frames], batch.figures, positions, batch.told)
                 if plan.options.result.fail_fast and batch.figures.first_error >= 0:
                     return
         progress.stopped_early = done < len(step.frames)

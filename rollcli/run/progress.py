@@ -62,59 +62,44 @@ class Figures(NamedTuple):
 
 
 class RunSummary:
-    """Takes in the rows of a run in their order, those of an interrupted run first.
+    """Takes in the rows of a run, in any order.
 
     Import-light: the dispatcher loads NumPy only for the rig's roll, once the workers have ended.
 
     Attributes
     ----------
     counts : Counter of str
-        How many rows have each status, apart from those whose frames are done again.
+        How many rows have each status.
     """
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
-        self._too_many = False
         self._files: list[str] = []
+        self._places = array("Q")
         self._status = bytearray()
         self._numbers = {name: array("d") for name in COLUMNS}
 
-    def add(self, files: Sequence[str], figures: Figures) -> None:
-        """Take the next rows."""
-        self._count(figures)
-        self._append(files, figures)
-
-    def add_row(self, row: Row) -> None:
-        """Take the next row."""
-        self.add([row.file], Figures.of([row]))
-
-    def leave_places(self, files: Sequence[str]) -> None:
-        """Leave the places of rows whose frames will be done, until `replace`."""
-        self._append(files, Figures(_NO_ANGLE * len(files), {}))
-
-    def replace(self, positions: Sequence[int], figures: Figures) -> None:
-        """Take rows in the places at these positions, from 0, that have been left to them."""
-        self._count(figures)
-        for at, position in enumerate(positions):
-            if position < len(self._files):
-                self._status[position] = figures.status[at]
-                for name, column in figures.numbers.items():
-                    self._numbers[name][position] = column[at]
-
-    def _count(self, figures: Figures) -> None:
+    def add(self, files: Sequence[str], figures: Figures, places: Sequence[int]) -> None:
+        """Take rows, which stand at these places of the result, from 0."""
         for place, status in enumerate(STATUSES):
             if found := figures.status.count(place):
                 self.counts[status] += found
-
-    def _append(self, files: Sequence[str], figures: Figures) -> None:
-        self._too_many |= len(self._files) + len(files) > _MOST_FRAMES
         if self._too_many:
             return
         self._files.extend(files)
+        self._places.extend(places)
         self._status.extend(figures.status)
         missing = array("d", [math.nan]) * len(files)
         for name, column in self._numbers.items():
             column.extend(figures.numbers.get(name, missing))
+
+    def add_row(self, row: Row, place: int = 0) -> None:
+        """Take a row; those of one place stay in the order in which they come."""
+        self.add([row.file], Figures.of([row]), [place])
+
+    @property
+    def _too_many(self) -> bool:
+        return self.frames > _MOST_FRAMES
 
     @property
     def frames(self) -> int:
@@ -148,11 +133,15 @@ class RunSummary:
         """Return the rig's roll in one line, such as `roll -0.44 ± 0.06°, 5 ok, 0 suspect, 0 failed`."""
         if self._too_many:
             return f"more than {_MOST_FRAMES:,} frames: rollcli rig RESULT says what they say of the rig"
+        import numpy as np
+
         from rollcli.rig.drive.assess import assess_rig
         from rollcli.rig.words import one_line
 
-        statuses = [STATUSES[each] for each in self._status]
-        return one_line(assess_rig({"file": self._files, "status": statuses, **self._numbers}))
+        order = np.argsort(self._places, kind="stable")
+        files, statuses = [self._files[at] for at in order], [STATUSES[self._status[at]] for at in order]
+        numbers = {name: np.asarray(column)[order] for name, column in self._numbers.items()}
+        return one_line(assess_rig({"file": files, "status": statuses, **numbers}))
 
     def pose_note(self, calibration: Calibration | None) -> str:
         """Return what the intervals of pitch and height leave out; empty where no frame has a pitch."""
@@ -360,23 +349,13 @@ class Progress(TaskProgress):
 
     def add(self, result: FrameResult) -> None:
         """Count a frame that is done, and say what the user should know about it."""
-        self.add_rows([result.row.file], Figures.of([result.row]), [result])
+        self.add_rows([result.row.file], Figures.of([result.row]), [self.done], [result])
 
     def add_rows(
-        self,
-        files: Sequence[str],
-        figures: Figures,
-        told: Iterable[FrameResult],
-        positions: Sequence[int] | None = None,
+        self, files: Sequence[str], figures: Figures, places: Sequence[int], told: Iterable[FrameResult]
     ) -> None:
-        """Count rows that are written, and say what the user should know about some of their frames.
-
-        They take the places at these positions, from 0, where these have been left to them.
-        """
-        if positions is None:
-            self.summary.add(files, figures)
-        else:
-            self.summary.replace(positions, figures)
+        """Count rows that are written, and say what the user should know about some of their frames."""
+        self.summary.add(files, figures, places)
         for result in told:
             self._tell_input(result)
             if result.row.status == "error":

@@ -328,9 +328,8 @@ class KeptRows:
             self.errors.append(self.count)
         if is_again:
             self.again.append(self.count)
-            self.summary.leave_places([row.file])
         else:
-            self.summary.add_row(row)
+            self.summary.add_row(row, self.count)
         self.count += 1
         return True
 
@@ -345,7 +344,6 @@ class KeptRows:
         """Leave a hole before the row at a position."""
         if position > self.count:
             self.holes += range(self.count, position)
-            self.summary.leave_places([frame.file for frame in self._frames[self.count : position]])
             self.count, self._following = position, iter(self._frames[position:])
 
 

@@ -11,7 +11,7 @@ import pytest
 from rollcli.files.results import Row
 from rollcli.run.frame import Frame, failed_frame
 from rollcli.run.options import EncodingOptions, RunningOptions
-from rollcli.run.progress import Figures, Progress, RunSummary, TaskProgress
+from rollcli.run.progress import Progress, RunSummary, TaskProgress
 
 GUESSED = EncodingOptions()
 
@@ -138,5 +138,4 @@ def test_of_more_frames_than_memory_is_meant_for_the_answer_names_who_has_it(mon
     found = RunSummary()
     for number in range(5):
         found.add_row(Row(f"{number}.png", status="ok", roll_deg=1.0, roll_ci95_deg=0.1))
-        found.replace([number], Figures.of([Row(f"{number}.png")]))
     assert found.rig_roll() == "more than 3 frames: rollcli rig RESULT says what they say of the rig"
