@@ -125,16 +125,13 @@ class Step(NamedTuple):
     frames : sequence of Frame
     positions : sequence of int
         Of their rows in the result, increasing; none where the images of kept rows are made again.
-    parts : Parts or None
-        Where their rows go, in parts.
-    retry_of : str
-        See `FrameOptions`; empty unless the rows take the place of kept ones.
+    retries : bool
+        Whether the rows take the place of kept ones.
     """
 
     frames: Sequence[Frame]
     positions: Sequence[int] = ()
-    parts: Parts | None = None
-    retry_of: str = ""
+    retries: bool = False
 
 
 def line_form(form: Format) -> Literal["csv", "jsonl"]:

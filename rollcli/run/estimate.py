@@ -10,12 +10,13 @@ from rollcli.errors import ExitStatus, OutputError, WorkerError
 from rollcli.files.stores.locations import is_url
 from rollcli.run.batch import Batch, BatchOptions, Step, join_results, line_form
 from rollcli.run.find import calibration_files, calibration_notes
-from rollcli.run.frame import Frame, FrameResult, ReadAs, failed_frame
+from rollcli.run.frame import Frame, FrameResult, failed_frame
 from rollcli.run.options import EstimateOptions, FrameOptions
 from rollcli.run.outputs import every_path, list_files, remove_image_leftovers, write_outputs
 from rollcli.run.plan import Plan, decoder_for, make_plan, workers_for
 from rollcli.run.progress import Progress
-from rollcli.run.result import Output, frames_to_do, open_output
+from rollcli.run.result import kept_of, open_output
+from rollcli.run.resume import Output
 from rollcli.run.workers.chunks import Work
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
 from rollcli.run.workers.tasks import require_scheduler, run_joined
@@ -41,7 +42,6 @@ def clear_frame(frame: Frame, options: FrameOptions) -> None:
         remove_image_leftovers([frame], options.images)
 
 
-_RETRIED_AT_ONCE = 1000  # frames whose work a kill costs; starting the workers anew adds 3 % of their time
 _NOTES = 3  # on how calibrations were read; the record of the run has those of more files
 
 
@@ -62,7 +62,7 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
     plan = make_plan(options)
     if not options.running.dry_run:
         return _run(plan, resume_command)
-    frames, images = frames_to_do(plan), options.images
+    frames, images = chain.from_iterable(step.frames for step in kept_of(plan).steps()), options.images
     of_frames = ((frame.reads(), every_path(frame, images)) for frame in frames)
     list_files(chain([(calibration_files(options.calibration), ())], of_frames, [((), plan.files)]))
     return ExitStatus.DONE
@@ -88,7 +88,7 @@ def _run(plan: Plan, resume_command: str) -> ExitStatus:
             output.finish(progress.summary)
         progress.tell_end()
         if stop.asked and progress.stopped_early:
-            how = f"; continue with: {resume_command}" if output.record else ""
+            how = f"; continue with: {resume_command}" if plan.files else ""
             progress.say(f"interrupted{how}")
             return ExitStatus.INTERRUPTED
         if not (progress.stopped_early or options.running.quiet):
@@ -99,27 +99,9 @@ def _run(plan: Plan, resume_command: str) -> ExitStatus:
         return progress.summary.status
 
 
-def _steps(plan: Plan, output: Output, progress: Progress) -> Iterator[Step]:
-    """Yield what is to do: images that kept rows should have, rows that are done again, then all others.
-
-    A result takes rows in the place of others once the workers have ended, which hold the lock of the file
-    that it was.
-    """
-    kept, result, every = output.kept, plan.output, plan.frames
-    if kept.incomplete:
-        missing = len(kept.incomplete)
-        progress.note(f"images are missing or empty for {missing} of the kept rows: they are made again")
-        yield Step(kept.incomplete)
-    name = result if is_url(result) else os.path.realpath(result)  # whichever folder it is resumed from
-    for first in range(0, len(kept.again), _RETRIED_AT_ONCE):
-        again = kept.again[first : first + _RETRIED_AT_ONCE]
-        yield Step([every[position] for position in again], again, retry_of=name)
-    yield from output.passes()
-
-
 def _run_steps(plan: Plan, output: Output, progress: Progress, stop: Stop) -> None:
     """Do one step after the other; images are written before rows, and rows in their order."""
-    for step in _steps(plan, output, progress):
+    for step in output.kept.steps():
         done = 0
         progress.stopped_early = True  # unless all frames are done
         with _results(step, plan, output, stop) as batches:
@@ -131,10 +113,8 @@ def _run_steps(plan: Plan, output: Output, progress: Progress, stop: Stop) -> No
                 if not positions:
                     output.restore(frames, batch)
                     continue
-                if step.retry_of:
-                    output.replace(positions, frames, batch)
-                else:
-                    output.append(frames, batch)
+                add = output.replace if step.retries else output.append
+                add(positions, frames, batch)
                 progress.add_rows([frame.file for frame in frames], batch.figures, positions, batch.told)
                 if plan.options.result.fail_fast and batch.figures.first_error >= 0:
                     return
@@ -146,9 +126,11 @@ def _run_steps(plan: Plan, output: Output, progress: Progress, stop: Stop) -> No
 @contextlib.contextmanager
 def _results(step: Step, plan: Plan, output: Output, stop: Stop) -> Iterator[Iterator[Batch]]:
     """Open the results of a step from whichever workers were asked for; the output is complete afterwards."""
-    options, record, frames, parts = plan.options, output.record, step.frames, step.parts
-    replaces = record.replaces if record else options.running.overwrite
-    told = options.frame._replace(replaces=replaces, retry_of=step.retry_of, notes=record is not None)
+    options, record, frames, parts = plan.options, output.record, step.frames, output.parts_of(step)
+    # whichever folder it is resumed from
+    result = plan.output if is_url(plan.output) else os.path.realpath(plan.output)
+    retry_of = result if step.retries else ""
+    told = options.frame._replace(replaces=record.replaces, retry_of=retry_of, notes=bool(plan.files))
     rows = BatchOptions(
         line_form(options.result.form),
         plan.further,
@@ -162,7 +144,7 @@ def _results(step: Step, plan: Plan, output: Output, stop: Stop) -> Iterator[Ite
         partial(lost_frame, options=told),
         partial(clear_frame, options=told),
         partial(join_results, options=rows),
-        lambda: record.read_as if record else ReadAs(),
+        lambda: record.read_as,
         parts.rows if parts else 1,
         decoder_for(frames, told),
     )
@@ -174,5 +156,5 @@ def _results(step: Step, plan: Plan, output: Output, stop: Stop) -> Iterator[Ite
     finally:
         output.commit()
         # a worker that died elsewhere cannot be waited for; a retry has removed what is not needed any more
-        if workers.scheduler is not None and not step.retry_of:
+        if workers.scheduler is not None and not step.retries:
             remove_image_leftovers(frames, options.images)

@@ -19,16 +19,15 @@ from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url, located, public_name
 from rollcli.run.batch import Batch, Parts, Step, line_form, part_location
 from rollcli.run.frame import Frame
-from rollcli.run.outputs import remove_image_leftovers
 from rollcli.run.plan import Plan
 from rollcli.run.progress import RunSummary
 from rollcli.run.result_file import Inputs, inputs_path, is_part_inputs, part_inputs_path, split_lines
-from rollcli.run.resume import KeptRows, RecordedOutput, RunRecord, new_record
+from rollcli.run.resume import KeptRows, Output, RunRecord, new_record
 
 _CHECK_S = 10.0  # a request of 50 ms now and then
 
 
-class PartsOutput(RecordedOutput):
+class PartsOutput(Output):
     """Rows to a folder of parts, FILE.inputs and FILE.run.json beside it.
 
     Workers write the parts of which they have all rows. This process writes the others.
@@ -41,32 +40,28 @@ class PartsOutput(RecordedOutput):
         self._parts = Parts(
             output, self._plan.format, self._plan.further, self._part_rows, (), 0, record.run, record.of_rows
         )
-        self._numbers: Iterator[int] = iter(())  # of the parts to come
-        self._waiting: list[tuple[bytes, bytes]] = []  # rows, and the lines of their inputs
+        self._waiting: list[tuple[int, bytes, bytes]] = []  # positions, rows, and the lines of their inputs
         self._images: list[str] = []  # those of the part that is being filled
         self._checked = time.monotonic()
         self._written = kept.count - len(kept.holes)
 
-    def passes(self) -> Iterator[Step]:
-        """Yield the frames of parts that are missing before others, then those after all of them."""
-        every, holes, done = self._plan.frames, self.kept.holes, self.kept.count
-        steps = (([every[at] for at in holes], holes), (every[done:], range(done, len(every))))
-        for frames, positions in steps:
-            if positions:
-                numbers = tuple(position // self._part_rows for position in positions[:: self._part_rows])
-                self._numbers = iter(numbers)
-                yield Step(frames, positions, self._parts._replace(numbers=numbers, frames=len(positions)))
+    def parts_of(self, step: Step) -> Parts | None:
+        """Say which parts the workers write of which they have all rows."""
+        if step.retries or not step.positions:
+            return None
+        numbers = tuple(position // self._part_rows for position in step.positions[:: self._part_rows])
+        return self._parts._replace(numbers=numbers, frames=len(step.positions))
 
-    def append(self, frames: Sequence[Frame], batch: Batch) -> None:
+    def append(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
         """Take the rows; every full part is written."""
         if time.monotonic() - self._checked > _CHECK_S:
-            self._check_owned()
+            self.record.check_owned()
+            self._checked = time.monotonic()
         self.record.saw(batch.read_as)
-        for _ in range(_whole_parts(batch.in_parts, self._part_rows)):
-            next(self._numbers)
-        self._written += batch.in_parts
-        self._waiting += zip(batch.lines, batch.notes, strict=True)
-        self._take_images(frames[batch.in_parts :], batch.figures.status[batch.in_parts :])
+        done = batch.in_parts
+        self._written += done
+        self._waiting += zip(positions[done:], batch.lines, batch.notes, strict=True)
+        self._take_images(frames[done:], batch.figures.status[done:])
         while len(self._waiting) >= self._part_rows:
             self._write()
 
@@ -74,7 +69,7 @@ class PartsOutput(RecordedOutput):
         """Write the last part, and the summary into the record."""
         if self._waiting:
             self._write()
-        self.record.write(summary)
+        super().finish(summary)
         _remove_leftovers(self._plan)  # of workers that have died
 
     def _keep_images(self, images: Iterable[str]) -> None:
@@ -83,32 +78,28 @@ class PartsOutput(RecordedOutput):
     def commit(self) -> None:
         """Write those parts anew of which rows are replaced; a part that is new waits until it is full."""
         self._sync_images()
-        for number in dict.fromkeys(position // self._part_rows for position in self._replacing):
+        for number in dict.fromkeys(position // self._part_rows for position in self._new_rows):
             self._write_anew(number)
         self._end_replacing()
 
     def _write_anew(self, number: int) -> None:
-        form = line_form(self._plan.format)
+        form, first = line_form(self._plan.format), number * self._part_rows
         old = [results.format_row(row, form, self._plan.further) for row in _rows_of_part(self._plan, number)]
         path = part_inputs_path(self._plan.output, number)
         inputs = read_bytes(path)
-        both = enumerate(zip(old, split_lines(inputs), strict=True), number * self._part_rows)
-        lines, notes = zip(*(self._replacing.get(*each) for each in both), strict=True)
-        if b"".join(notes) != inputs:
-            self._check_owned()
+        lines = [self._new_rows.get(*each) for each in enumerate(old, first)]
+        notes = b"".join(self._new_notes.get(*each) for each in enumerate(split_lines(inputs), first))
+        if notes != inputs:
+            self.record.check_owned()
             # in this order: of a run that is killed in between, the rows still are errors, and are done again
-            write_bytes(path, b"".join(notes), durable=True)
-        if lines != tuple(old):
-            self._check_owned()
+            write_bytes(path, notes, durable=True)
+        if lines != old:
+            self.record.check_owned()
             write_bytes(_location(self._plan, number), self._parts.encoded(number, lines), durable=True)
 
     def hint(self) -> str:
         """Say that --resume continues after the last part."""
         return f"; {self._written} rows are kept, continue with --resume" if self._written else ""
-
-    def _check_owned(self) -> None:
-        self.record.check_owned()
-        self._checked = time.monotonic()
 
     def _sync_images(self) -> None:
         sync_files(self._images)
@@ -116,9 +107,8 @@ class PartsOutput(RecordedOutput):
 
     def _write(self) -> None:
         self._sync_images()
-        lines, notes = zip(*self._waiting[: self._part_rows], strict=True)
-        self._parts.write(next(self._numbers), lines, notes)
-        self._checked = time.monotonic()
+        positions, lines, notes = zip(*self._waiting[: self._part_rows], strict=True)
+        self._parts.write(positions[0] // self._part_rows, lines, notes)
         self._written += len(lines)
         self._waiting = self._waiting[self._part_rows :]
 
@@ -142,15 +132,12 @@ def open_parts(plan: Plan) -> Iterator[PartsOutput]:
 
 
 def _begin(plan: Plan) -> PartsOutput:
-    options = plan.options
     # again, now that no other run can write it
     parts = check_parts(plan)
     kept, renewed = _kept(plan, parts)
     record = new_record(plan, kept)
     _remove_leftovers(plan, parts)
-    if options.result.resume or options.running.overwrite:
-        remove_image_leftovers(kept.not_failed(), options.images)
-    rows = options.result.part_rows
+    rows = plan.options.result.part_rows
     whole = set(range(_whole_parts(kept.count, rows))).difference(at // rows for at in kept.holes)
     stay = {path for number in whole for path in _part_paths(plan, number)}
     inputs = [f"{inputs_path(plan.output)}/{name}" for name in list_names(inputs_path(plan.output))]
@@ -226,11 +213,11 @@ def _kept(plan: Plan, parts: list[str]) -> tuple[KeptRows, dict[str, bytes]]:
             kept.skip_to(first)
             path = part_inputs_path(plan.output, numbered[base_name(name)])
             inputs = read_bytes(path)
-            kept.inputs = Inputs(inputs)
-            if not all(map(kept.add, found)):
+            lines = Inputs(inputs)
+            if not kept.take(found, lines):
                 raise InputError(f"{public_name(path)}: is damaged: it does not say what a row was made from")
-            if kept.inputs.lines != inputs:
-                renewed[path] = bytes(kept.inputs.lines)
+            if lines.lines != inputs:
+                renewed[path] = bytes(lines.lines)
     except InputError as error:
         raise not_resumable(plan.output, str(error)) from error
     return kept, renewed

@@ -11,13 +11,12 @@ from rollcli.files.atomic import is_there, remove_leftovers
 from rollcli.files.locking import not_resumable
 from rollcli.files.results import format_header, parse_rows, run_path
 from rollcli.files.stores.locations import base_name
-from rollcli.files.stream import STDOUT, is_stream, open_stream
-from rollcli.run.batch import Batch, Step
+from rollcli.files.stream import is_stream, open_stream
+from rollcli.run.batch import Batch
 from rollcli.run.frame import Frame
-from rollcli.run.outputs import local_images, remove_image_leftovers
-from rollcli.run.parts import PartsOutput, kept_in_parts, open_parts
+from rollcli.run.outputs import local_images
+from rollcli.run.parts import kept_in_parts, open_parts
 from rollcli.run.plan import Plan
-from rollcli.run.progress import RunSummary
 from rollcli.run.result_file import (
     DurableRows,
     Inputs,
@@ -32,7 +31,7 @@ from rollcli.run.result_file import (
 )
 from rollcli.run.resume import (
     KeptRows,
-    RecordedOutput,
+    Output,
     RunRecord,
     arranged,
     is_replaceable_record,
@@ -40,54 +39,27 @@ from rollcli.run.resume import (
 )
 
 
-class StreamOutput:
+class StreamOutput(Output):
     """Rows to stdout, a pipe or a device."""
 
-    record = None
-
     def __init__(self, write: Callable[[bytes], None], plan: Plan) -> None:
-        self.kept = KeptRows(plan)
-        self._write, self._plan = write, plan
+        super().__init__(RunRecord(plan), KeptRows(plan))
+        self._write = write
         self._write(format_header(plan.format, plan.further))
 
-    def passes(self) -> Iterator[Step]:
-        """Yield all frames."""
-        yield Step(self._plan.frames, range(len(self._plan.frames)))
-
-    def append(self, frames: Sequence[Frame], batch: Batch) -> None:
+    def append(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
         """Write the rows; they have left this process when this returns."""
         self._write(b"".join(batch.lines))
 
-    def finish(self, summary: RunSummary) -> None:
-        """Do nothing: a stream has no record."""
 
-    def restore(self, frames: Sequence[Frame], batch: Batch) -> None:
-        """Do nothing: a stream keeps no rows."""
-
-    def replace(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
-        """Do nothing: a stream keeps no rows."""
-
-    def commit(self) -> None:
-        """Do nothing: no row waits."""
-
-    def hint(self) -> str:
-        """Return nothing: a stream cannot be resumed."""
-        return ""
-
-
-class FileOutput(RecordedOutput):
+class FileOutput(Output):
     """Rows to a locked file, FILE.inputs and FILE.run.json beside it; images are durable before their row."""
 
     def __init__(self, file: ResultFile, inputs: ResultFile, record: RunRecord, kept: KeptRows) -> None:
         super().__init__(record, kept)
         self._file, self._inputs, self._rows = file, inputs, DurableRows(file, inputs)
 
-    def passes(self) -> Iterator[Step]:
-        """Yield the frames after the rows that are kept."""
-        frames = self._plan.frames
-        yield Step(frames[self.kept.count :], range(self.kept.count, len(frames)))
-
-    def append(self, frames: Sequence[Frame], batch: Batch) -> None:
+    def append(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
         """Add the rows, after the record knows how their frames were read; they may wait for others."""
         self.record.saw(batch.read_as)
         images = local_images(frames, batch.figures.status, self._plan.options.images)
@@ -99,27 +71,21 @@ class FileOutput(RecordedOutput):
     def commit(self) -> None:
         """Force the images and rows that were added to the disk."""
         self._rows.commit()
-        if self._replacing:
-            rows = {at: row for at, (row, _) in self._replacing.items()}
-            lines = {at: line for at, (_, line) in self._replacing.items()}
-            writes = [(self._file, rows, self._plan.format), (self._inputs, lines, "jsonl")]
+        if self._new_rows:
+            writes = [
+                (self._file, self._new_rows, self._plan.format),
+                (self._inputs, self._new_notes, "jsonl"),
+            ]
             # a run that is killed in between leaves rows that the same command makes again: where it updates,
             # those whose lines tell of other contents, and else those that still are errors
             for file, new, form in writes if self._plan.options.result.update else reversed(writes):
                 file.replace(new, form)
             self._end_replacing()
 
-    def finish(self, summary: RunSummary) -> None:
-        """Write it into the record."""
-        self.record.write(summary)
-
     def hint(self) -> str:
         """Say that --resume continues, if rows were written and their file still is there."""
         rows = self.kept.count + self._rows.written
         return f"; {rows} rows are kept, continue with --resume" if rows and self._file.is_there() else ""
-
-
-Output = StreamOutput | FileOutput | PartsOutput
 
 
 @contextlib.contextmanager
@@ -134,7 +100,7 @@ def open_output(plan: Plan) -> Iterator[Output]:
     OutputError
         It cannot be written.
     """
-    if plan.in_parts and plan.output != STDOUT:
+    if plan.in_parts:
         with open_parts(plan) as parts:
             yield parts
         return
@@ -149,8 +115,8 @@ def open_output(plan: Plan) -> Iterator[Output]:
                 yield _begin(file, inputs, plan)
 
 
-def frames_to_do(plan: Plan) -> Iterator[Frame]:
-    """Yield the frames that a run would work on, without opening the result for writing.
+def kept_of(plan: Plan) -> KeptRows:
+    """Take in the rows that a run would keep, without opening the result for writing.
 
     Raises
     ------
@@ -158,50 +124,44 @@ def frames_to_do(plan: Plan) -> Iterator[Frame]:
         As `open_output`.
     """
     if plan.in_parts:
-        kept = kept_in_parts(plan)
-    else:
-        _check_permitted(plan)
-        kept = _parsed(data_of(plan.output) if plan.options.result.resume else b"", plan)[1]
-    undone = (plan.frames[position] for position in (*kept.again, *kept.holes))
-    return chain(kept.incomplete, undone, plan.frames[kept.count :])
+        return kept_in_parts(plan)
+    _check_permitted(plan)
+    return _parsed(data_of(plan.output) if plan.options.result.resume else b"", plan)[0]
 
 
-def _parsed(data: bytes, plan: Plan) -> tuple[bytes, KeptRows]:
-    """Take in the rows of a file as far as they count, in the order of the frames; return their bytes too."""
-    data = kept_rows(data, plan.output, plan.format)
+def _parsed(data: bytes, plan: Plan) -> tuple[KeptRows, bytes, bytes]:
+    """Take in the rows of a file as far as they count, in the order of the frames.
+
+    Returns
+    -------
+    kept : KeptRows
+    rows, inputs : bytes
+        Those of the rows that are kept, and of the lines of their inputs; both are empty where none is.
+    """
+    data, kept = kept_rows(data, plan.output, plan.format), KeptRows(plan)
     if not data:
-        return b"", KeptRows(plan)
-    update, gone = plan.options.result.update, 0
+        return kept, b"", b""
+    update = plan.options.result.update
     inputs = Inputs(data_of(inputs_path(plan.output)), updates=update)
     if update:
-        data, gone = arranged(data, plan)
-    kept = KeptRows(plan, parse_rows(data, plan.output), inputs)
-    kept.gone = gone
+        data, kept.gone = arranged(data, plan)
+    kept.take(parse_rows(data, plan.output), inputs)
     lines = row_lines(io.BytesIO(data), plan.format)
-    return b"".join(islice(lines, kept.count + (plan.format == "csv"))), kept
+    rows = b"".join(islice(lines, kept.count + (plan.format == "csv"))) if kept.count else b""
+    return kept, rows, bytes(inputs.lines)
 
 
 def _begin(file: ResultFile, inputs: ResultFile, plan: Plan) -> FileOutput:
-    options = plan.options
-    before = file.read() if options.result.resume else b""
     try:
-        data, kept = _parsed(before, plan)
+        kept, rows, lines = _parsed(file.read() if plan.options.result.resume else b"", plan)
     except InputError as error:
         raise not_resumable(plan.output, str(error)) from error
     record = new_record(plan, kept)
-    if options.result.resume or options.running.overwrite:
-        first = 0 if options.result.retry_failed else kept.count
-        remove_image_leftovers(kept.not_failed(first), options.images)
-    written = (plan.output, inputs_path(plan.output))
-    remove_leftovers([run_path(plan.output), *map(os.path.realpath, written)])
-    # in this order, a run that is killed in between can be resumed: an empty file counts as a new one
-    if not before.startswith(data):
-        file.rewrite([data])  # before the other: a row without its line counts for nothing
-    file.truncate(len(data) if kept.count else 0)
-    lines = bytes(kept.inputs.lines) if kept.inputs else b""
-    if not inputs.read().startswith(lines):
-        inputs.rewrite([lines])
-    inputs.truncate(len(lines))
+    remove_leftovers(chain(plan.files, map(os.path.realpath, plan.files)))
+    # in this order, a run that is killed in between can be resumed: an empty file counts as a new one, and a
+    # row without its line for nothing
+    file.keep(rows)
+    inputs.keep(lines)
     record.write()
     if not kept.count:
         file.append(format_header(plan.format, plan.further))

@@ -46,8 +46,8 @@ class ResultFile:
     def __init__(self, descriptor: int, name: str) -> None:
         self._descriptor, self._name = descriptor, name
 
-    def read(self) -> bytes:
-        """Read the whole file.
+    def read(self, most: int = -1) -> bytes:
+        """Read the whole file, or its first bytes.
 
         Raises
         ------
@@ -57,18 +57,20 @@ class ResultFile:
         with writing(self._name):
             os.lseek(self._descriptor, 0, os.SEEK_SET)  # locking moves the position on Windows
             with open(self._descriptor, "rb", closefd=False) as file:
-                return file.read()
+                return file.read(most)
 
-    def truncate(self, size: int) -> None:
-        """Keep the first `size` bytes, and continue after them.
+    def keep(self, data: bytes) -> None:
+        """Let the file hold these bytes alone, and continue after them; written anew where it must be.
 
         Raises
         ------
         OutputError
             The file system refuses.
         """
+        if self.read(len(data)) != data:
+            self.rewrite([data])
         with writing(self._name):
-            os.ftruncate(self._descriptor, size)
+            os.ftruncate(self._descriptor, len(data))
             os.lseek(self._descriptor, 0, os.SEEK_END)
 
     def append(self, lines: bytes) -> None:

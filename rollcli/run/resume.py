@@ -9,9 +9,9 @@ import io
 import json
 import os
 import uuid
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
+from functools import cached_property
 from itertools import islice
 from typing import Any, TypeVar, get_args
 
@@ -23,7 +23,7 @@ from rollcli.files.storage import write_bytes
 from rollcli.files.stores.locations import base_name, public_name
 from rollcli.rig.calibration import Calibration
 from rollcli.run import outputs
-from rollcli.run.batch import Batch, check_owned
+from rollcli.run.batch import Batch, Parts, Step, check_owned
 from rollcli.run.frame import Frame, ReadAs
 from rollcli.run.options import (
     EncodingOptions,
@@ -76,10 +76,13 @@ class RunRecord:
         self._begun = False
         # older images, now and after a resume
         self.replaces = options.running.overwrite or options.result.update
-        inputs = names_of(plan.frames)
-        self.fixed = dict[str, Any](rollcli=__version__, options=_effective(plan), inputs=inputs)
-        if options.calibration.given:
-            self.fixed["calibration"] = _calibrations(plan.frames)
+
+    @cached_property
+    def fixed(self) -> dict[str, Any]:
+        """What was fixed before the run; made when asked for, since that takes all frames."""
+        plan = self.plan
+        fixed = {"rollcli": __version__, "options": _effective(plan), "inputs": names_of(plan.frames)}
+        return fixed | ({"calibration": _calibrations(plan.frames)} if plan.options.calibration.given else {})
 
     def check_owned(self) -> None:
         """Check that no other run has begun since; see `batch.check_owned`."""
@@ -104,7 +107,7 @@ class RunRecord:
             self.write()
 
     def write(self, summary: RunSummary | None = None) -> None:
-        """Write the file, whole or not at all; there is no summary until the run is over.
+        """Write the file, whole or not at all; none of a stream. No summary until the run is over.
 
         Raises
         ------
@@ -113,6 +116,8 @@ class RunRecord:
         OutputError
             It cannot be written.
         """
+        if not self.plan.files:
+            return
         self.check_owned()
         record = {
             **self.fixed,
@@ -254,6 +259,9 @@ def _kinds(name: str, default: Any) -> tuple[type, ...]:
     return {int: (int,), float: (int, float), tuple: (tuple,)}.get(type(default), (str,))
 
 
+_RETRIED_AT_ONCE = 1000  # frames whose work a kill costs; starting the workers anew adds 3 % of their time
+
+
 class KeptRows:
     """Takes in the rows in their order, and holds none of them: there may be a million.
 
@@ -278,7 +286,7 @@ class KeptRows:
         Which row is the first that is not of the frame in its place; empty where there is none.
     """
 
-    def __init__(self, plan: Plan, rows: Iterable[results.Row] = (), inputs: Inputs | None = None) -> None:
+    def __init__(self, plan: Plan) -> None:
         self.count, self.gone = 0, 0
         self.changed: list[str] = []
         self.holes: list[int] = []
@@ -291,33 +299,33 @@ class KeptRows:
         self._following = iter(plan.frames)
         self._retries = plan.options.result.retry_failed
         self._made = outputs.Existing(filled=True)
-        self.inputs = inputs
-        for row in rows:
-            if not self.add(row):
-                break
 
-    def not_failed(self, first: int = 0) -> Iterator[Frame]:
-        """Yield the frames from a position on whose row is not `error`, or not there yet.
+    def not_failed(self) -> Iterator[Frame]:
+        """Yield the frames whose row is not `error`, or not there yet.
 
         Marks beside images of the others are needed until these are done again.
         """
         failed = set(self.errors)
-        return (
-            self._frames[position] for position in range(first, len(self._frames)) if position not in failed
-        )
+        return (frame for position, frame in enumerate(self._frames) if position not in failed)
 
-    def add(self, row: results.Row) -> bool:
-        """Take in the next row; one that does not count is left out, and so are those behind it."""
+    def take(self, rows: Iterable[results.Row], inputs: Inputs) -> bool:
+        """Take in the next rows, up to one that has no line among those of the inputs; tell whether none has.
+
+        Such a row is left out, and so are those behind it.
+        """
+        return all(self._add(row, inputs) for row in rows)
+
+    def _add(self, row: results.Row, inputs: Inputs) -> bool:
         is_again = row.message == _NOT_YET or (row.status == "error" and self._retries)
         if (frame := next(self._following, None)) is not None:
             if not self.mismatch and (row.file, row.right_file) != (frame.file, frame.right_file):
                 self.mismatch = f"its row is of {row.file}, where now {frame.file} is"
-            if self.inputs is not None and not self.mismatch:
+            if not self.mismatch:
                 if row.message == _NOT_YET:
-                    self.inputs.take_unknown(frame)
-                elif not self.inputs.take(frame):
+                    inputs.take_unknown(frame)
+                elif not inputs.take(frame):
                     return False
-                if not is_again and self.inputs.has_changed(frame):
+                if not is_again and inputs.has_changed(frame):
                     self.changed.append(frame.file)
                     is_again = True
             if row.status != "error" and not is_again:
@@ -334,11 +342,30 @@ class KeptRows:
         return True
 
     def notes(self) -> Iterator[str]:
-        """Yield what is said of an update before it begins."""
+        """Yield what is said of them before the run begins."""
         if changed := len(self.changed):
             yield f"frames that are done again, since what they were made from has changed: {changed}"
         if self.gone:
             yield f"frames that are gone, whose rows leave the result and whose images stay: {self.gone}"
+        if missing := len(self.incomplete):
+            yield f"images are missing or empty for {missing} of the kept rows: they are made again"
+
+    def steps(self) -> Iterator[Step]:
+        """Yield what is to do: images that kept rows should have, rows that are done again, then all others.
+
+        A result takes rows in the place of others once the workers have ended, which hold the lock of the
+        file that it was.
+        """
+        every = self._frames
+        if self.incomplete:
+            yield Step(self.incomplete)
+        for first in range(0, len(self.again), _RETRIED_AT_ONCE):
+            again = self.again[first : first + _RETRIED_AT_ONCE]
+            yield Step([every[at] for at in again], again, retries=True)
+        if self.holes:
+            yield Step([every[at] for at in self.holes], self.holes)
+        if self.count < len(every):
+            yield Step(every[self.count :], range(self.count, len(every)))
 
     def skip_to(self, position: int) -> None:
         """Leave a hole before the row at a position."""
@@ -398,8 +425,8 @@ def _with_columns(data: bytes, plan: Plan) -> bytes:
     )
 
 
-class RecordedOutput(ABC):
-    """What a file and a folder of parts have in common: the record of the run, and rows in place of others.
+class Output:
+    """Where the rows of a run go: a stream, a file or a folder of parts.
 
     Attributes
     ----------
@@ -411,7 +438,27 @@ class RecordedOutput(ABC):
 
     def __init__(self, record: RunRecord, kept: KeptRows) -> None:
         self.record, self.kept, self._plan = record, kept, record.plan
-        self._replacing: dict[int, tuple[bytes, bytes]] = {}  # rows, and the lines of their inputs
+        # what takes the place of kept rows, by their positions, and of the lines of their inputs
+        self._new_rows: dict[int, bytes] = {}
+        self._new_notes: dict[int, bytes] = {}
+
+    def parts_of(self, step: Step) -> Parts | None:
+        """Say where workers write the rows of a step; None: all come back."""
+        return None
+
+    def append(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
+        """Add the rows of these positions, which may wait for others."""
+
+    def commit(self) -> None:
+        """Force to the disk what was added: what a stream was given has left this process."""
+
+    def finish(self, summary: RunSummary) -> None:
+        """Write the summary into the record."""
+        self.record.write(summary)
+
+    def hint(self) -> str:
+        """Say that --resume continues, if rows are kept; a stream keeps none."""
+        return ""
 
     def restore(self, frames: Sequence[Frame], batch: Batch) -> None:
         """Take the images of incomplete frames, which were made again.
@@ -432,44 +479,48 @@ class RecordedOutput(ABC):
         `commit` writes them all at once.
         """
         self.record.saw(batch.read_as)
-        self._replacing.update(zip(positions, zip(batch.lines, batch.notes, strict=True), strict=True))
+        self._new_rows.update(zip(positions, batch.lines, strict=True))
+        self._new_notes.update(zip(positions, batch.notes, strict=True))
         self._take_images(frames, batch.figures.status)
 
     def _take_images(self, frames: Sequence[Frame], status: bytes) -> None:
         self._keep_images(outputs.local_images(frames, status, self._plan.options.images))
 
-    @abstractmethod
     def _keep_images(self, images: Iterable[str]) -> None:
         """Have images forced to the disk before the rows that come next are written."""
 
     def _end_replacing(self) -> None:
         """Forget the rows that are written, and what told their images from those of other programs."""
-        outputs.remove_marks([self._plan.frames[at] for at in self._replacing], self._plan.options.images)
-        self._replacing.clear()
+        outputs.remove_marks([self._plan.frames[at] for at in self._new_rows], self._plan.options.images)
+        self._new_rows.clear()
+        self._new_notes.clear()
 
 
 def new_record(plan: Plan, kept: KeptRows) -> RunRecord:
     """Make the record of a run, which continues that of an interrupted run where rows are kept.
+
+    What killed workers left beside the images is removed.
 
     Raises
     ------
     UsageError
         It cannot be continued; says what differs. Or it is a first start, and there are images already.
     """
-    record = RunRecord(plan)
-    if not (kept.count or plan.options.result.resume):
-        return record
-    try:
-        earlier = results.read_run(plan.output)
-        found = next(_differences(kept, earlier, record), "")
-    except InputError as error:
-        found = str(error)
-    if found and kept.count:
-        raise not_resumable(plan.output, found)
-    if found:  # what is there is of another run
-        outputs.check_nothing_is_there(outputs.images_of(plan.frames, plan.options.images))
-    elif earlier is not None:
-        record.continue_from(earlier)
+    record, options = RunRecord(plan), plan.options
+    if options.result.resume:
+        try:
+            earlier = results.read_run(plan.output)
+            found = next(_differences(kept, earlier, record), "")
+        except InputError as error:
+            found = str(error)
+        if found and kept.count:
+            raise not_resumable(plan.output, found)
+        if found:  # what is there is of another run
+            outputs.check_nothing_is_there(outputs.images_of(plan.frames, options.images))
+        elif earlier is not None:
+            record.continue_from(earlier)
+    if options.result.resume or options.running.overwrite:
+        outputs.remove_image_leftovers(kept.not_failed(), options.images)
     return record
 
 

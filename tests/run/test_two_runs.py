@@ -27,20 +27,19 @@ def plan(bucket, tmp_path):
     return make_plan(defaults._replace(inputs=InputOptions((str(tmp_path / "maps"),)), result=result))
 
 
-def append(output, frames):
+def append(output, frames, first=0):
     """The rows of frames, as workers would return them."""
     told = BatchOptions("csv", (), FrameOptions(notes=True), verbose=False, fail_fast=False)
-    next(output.passes())
-    for frame in frames:
+    for at, frame in enumerate(frames, first):
         result = FrameResult(Row(frame.file, status="ok", roll_deg=1.0))
-        output.append([frame], join_results(Span([frame], 0, output.record.read_as), [result], told))
+        output.append([at], [frame], join_results(Span([frame], 0, output.record.read_as), [result], told))
 
 
 def test_of_two_runs_in_a_bucket_the_last_to_begin_goes_on_and_the_other_ends(bucket, plan):
     with open_output(plan) as first, open_output(plan) as last:
         append(first, plan.frames[:1])
         with pytest.raises(UsageError, match="another run has begun to write this result"):
-            append(first, plan.frames[1:])
+            append(first, plan.frames[1:], 1)
         append(last, plan.frames)
         summary = RunSummary()
         for frame in plan.frames:
@@ -63,7 +62,7 @@ def test_a_run_whose_rows_come_slowly_looks_now_and_then(plan, monkeypatch):
             open_output(plan),
             pytest.raises(UsageError, match="another run has begun to write this result"),
         ):
-            append(first, plan.frames[1:2])  # the part is not full
+            append(first, plan.frames[1:2], 1)  # the part is not full
 
 
 def test_two_runs_that_begin_in_the_same_second_are_told_apart_at_once(plan, monkeypatch):
