@@ -220,25 +220,18 @@ def whole_rows(data: bytes, form: Format) -> bytes:
 
     A row of CSV ends at a newline outside quotes: a file name may hold newlines.
     """
-    end = data.rfind(b"\n") + 1
-    if form == "jsonl":
-        return data[:end]
-    quotes = data.count(b'"', 0, end)
-    while end and quotes % 2:
-        before = data.rfind(b"\n", 0, end - 1) + 1
-        quotes -= data.count(b'"', before, end)
-        end = before
-    return data[:end]
+    return b"".join(line for line in row_lines(io.BytesIO(data), form) if line.endswith(b"\n"))
 
 
 def row_lines(file: Iterable[bytes], form: Format) -> Iterator[bytes]:
     """Yield the header and the rows of a whole result; a row of CSV may hold newlines in quotes."""
-    line = b""
+    pieces, quotes = list[bytes](), 0
     for piece in file:
-        line += piece
-        if form == "jsonl" or line.count(b'"') % 2 == 0:
-            yield line
-            line = b""
+        pieces.append(piece)
+        quotes += piece.count(b'"')
+        if form == "jsonl" or quotes % 2 == 0:
+            yield b"".join(pieces)
+            pieces.clear()
 
 
 def _reopen(descriptor: int, path: str, flags: int) -> None:

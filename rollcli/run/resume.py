@@ -5,7 +5,6 @@ that are finished.
 """
 
 import hashlib
-import io
 import json
 import os
 import uuid
@@ -35,7 +34,7 @@ from rollcli.run.options import (
 )
 from rollcli.run.plan import Plan
 from rollcli.run.progress import RunSummary
-from rollcli.run.result_file import Inputs, data_of, row_lines
+from rollcli.run.result_file import Inputs, data_of
 from rollcli.stereo.options import StereoOptions
 
 
@@ -392,37 +391,25 @@ def arranged(data: bytes, plan: Plan) -> tuple[bytes, int]:
     bytes, int
         The result; and how many rows have left it, since their frames are gone.
     """
-    data = _with_columns(data, plan)
-    lines = row_lines(io.BytesIO(data), plan.format)
-    header = next(lines) if plan.format == "csv" else b""
-    places, ends, end = dict[int, int](), [len(header)], len(header)
-    for row, line in zip(results.parse_rows(data, plan.output), lines, strict=False):
-        places[hash((row.file, row.right_file))] = len(ends) - 1
-        end += len(line)
-        ends.append(end)
-    pieces, waiting = [header], list[bytes]()
+    before = dict[int, bytes]()
+    for row in results.parse_rows(data, plan.output):
+        # fx and fy of a calibration may have come to differ, or to be the same
+        now = replace(row, image_roll_deg=row.map_roll_deg)
+        before[_key(row)] = results.format_row(now, plan.format, plan.further)
+    pieces, waiting = [results.format_header(plan.format, plan.further)], list[bytes]()
     for frame in plan.frames:
-        place = places.pop(hash((frame.file, frame.right_file)), None)
-        if place is None:
+        line = before.pop(_key(frame), None)
+        if line is None:
             row = results.Row(frame.file, frame.right_file, "error", message=_NOT_YET)
             waiting.append(results.format_row(row, plan.format, plan.further))
         else:
-            pieces += [*waiting, data[ends[place] : ends[place + 1]]]
+            pieces += [*waiting, line]
             waiting.clear()
-    return b"".join(pieces), len(places)
+    return b"".join(pieces), len(before)
 
 
-def _with_columns(data: bytes, plan: Plan) -> bytes:
-    """Return a result with the columns of this run: fx and fy of a calibration may have come to differ."""
-    first, further = data.partition(b"\n")[0], plan.further
-    others = further[1:] if results.IMAGE_ROLL in further else (results.IMAGE_ROLL, *further)
-    names = first.decode().split(",") if plan.format == "csv" else list(json.loads(first))
-    if names != list(results.columns(others)):
-        return data
-    rows = (replace(row, image_roll_deg=row.map_roll_deg) for row in results.parse_rows(data, plan.output))
-    return results.format_header(plan.format, further) + b"".join(
-        results.format_row(row, plan.format, further) for row in rows
-    )
+def _key(of: results.Row | Frame) -> int:
+    return hash((of.file, of.right_file))  # which takes less memory than the names
 
 
 class Output:
