@@ -41,11 +41,8 @@ def local_images(
     frames: Iterable[Frame], status: bytes, images: ImageOptions, root: str = ""
 ) -> Iterator[str]:
     """Yield the images of those frames that have angles which a power cut may take from a local disk."""
-    if not images.folders():
-        return
-    for frame, place in zip(frames, status, strict=True):
-        if STATUSES[place] != "error":
-            yield from itertools.filterfalse(is_url, every_path(frame, images, root))
+    angled = (frame for frame, at in zip(frames, status, strict=True) if STATUSES[at] != "error")
+    return itertools.filterfalse(is_url, images_of(angled, images, root))
 
 
 def output_path(frame: Frame, folder: str, ending: str | None = None) -> str:
@@ -64,11 +61,11 @@ def every_path(frame: Frame, images: ImageOptions, root: str = "") -> list[str]:
     return [located(root, path) for _, paths in possible_paths(frame, images) for path in paths]
 
 
-def images_of(frames: Iterable[Frame], images: ImageOptions) -> Iterator[str]:
+def images_of(frames: Iterable[Frame], images: ImageOptions, root: str = "") -> Iterator[str]:
     """Yield every image that may be written for frames; a list of them would take most of our memory."""
     if not images.folders():
         return iter(())
-    return (path for frame in frames for path in every_path(frame, images))
+    return (path for frame in frames for path in every_path(frame, images, root))
 
 
 def write_outputs(

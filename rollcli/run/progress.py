@@ -45,15 +45,12 @@ class Figures(NamedTuple):
     @classmethod
     def of(cls, rows: Sequence[Row]) -> "Figures":
         """Take them of rows."""
-        columns = {name: [getattr(row, name) for row in rows] for name in COLUMNS}
-        return cls(
-            bytes(STATUSES.index(row.status) for row in rows),
-            {
-                name: array("d", (math.nan if value is None else value for value in values))
-                for name, values in columns.items()
-                if any(value is not None for value in values)
-            },
-        )
+        numbers = {}
+        for name in COLUMNS:
+            values = [getattr(row, name) for row in rows]
+            if any(value is not None for value in values):
+                numbers[name] = array("d", (math.nan if value is None else value for value in values))
+        return cls(bytes(STATUSES.index(row.status) for row in rows), numbers)
 
     @property
     def first_error(self) -> int:
@@ -376,16 +373,11 @@ class Progress(TaskProgress):
             code = " ".join(filter(result.warnings.get, result.warnings))
             line = f"{name}: warning: {warning}"
             first = self._warnings.add(code, line)
-            if self._verbose:
-                self.detail(line)
-            elif first:
-                self.note(first)
+            if first or self._verbose:
+                self.note(line)
         if searched is not None:
             how = f"{name}: searched disparities from {searched[0]} to {searched[1]} px"
-            if self._verbose:
-                self.detail(how)
-            else:
-                self.note(how, topic="searched")
+            self.note(how, topic="" if self._verbose else "searched")
 
     def tell_end(self) -> None:
         """Say which causes of warnings and failures were met more than once, and the summary."""
