@@ -1,7 +1,7 @@
 """`derotate`, `vdisparity`, `heights` and `disparity`: each frame becomes files of its own."""
 
-import contextlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 
@@ -44,24 +44,19 @@ def run_conversion(options: ConvertOptions) -> ExitStatus:
         outputs.list_files((each.reads(), outputs.paths_of(each, options)) for each in frames)
         return ExitStatus.DONE
     require_scheduler(running.scheduler)
-    _remove_leftovers(frames, options)
     progress = Progress(len(frames), running, options.encoding, statuses=("ok",))
     told = replace(options, inputs=InputOptions())  # which may be long
     work = Work(
         partial(_convert, options=told, read=options.frame),  # made here, where relative paths start
         partial(_lost, options=told),
-        lambda frame: _remove_leftovers([frame], told),
+        partial(_remove_leftovers, options=told),
         prepare=decoder_for(frames, options.frame),
     )
+    work.clear(frames)
     workers = workers_for(frames, running, [options.output])
-    with stop_on_signals() as stop, progress:
-        try:
-            with contextlib.closing(run_tasks(frames, work, stop, workers)) as results:
-                for result in results:
-                    progress.add(result)
-        finally:
-            if running.scheduler is not None:  # a worker that died elsewhere cannot be waited for
-                _remove_leftovers(frames, options)
+    with stop_on_signals() as stop, progress, closing(run_tasks(frames, work, stop, workers)) as results:
+        for result in results:
+            progress.add(result)
     progress.tell_end()
     if stop.asked and progress.done < progress.total:
         progress.say("interrupted; what is written is whole, and --overwrite starts anew")
@@ -133,7 +128,7 @@ def _find_rows(frames: Sequence[Frame], options: ConvertOptions) -> Sequence[Row
     return rows
 
 
-def _remove_leftovers(frames: Sequence[Frame], options: ConvertOptions) -> None:
+def _remove_leftovers(frames: Iterable[Frame], options: ConvertOptions) -> None:
     remove_leftovers(path for frame in frames for path in outputs.paths_of(frame, options))
 
 

@@ -2,7 +2,7 @@
 
 import contextlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import partial
 from itertools import chain, islice
 
@@ -36,10 +36,10 @@ def lost_frame(frame: Frame, reason: str, options: FrameOptions) -> FrameResult:
     return failed_frame(frame, reason)
 
 
-def clear_frame(frame: Frame, options: FrameOptions) -> None:
-    """Remove the halves of images that a worker left which died amid this frame."""
+def clear_frames(frames: Iterable[Frame], options: FrameOptions) -> None:
+    """Remove the halves of images that a worker left which died amid one of these frames."""
     if not options.retry_of:  # they go when the row is written, with marks that are needed until then
-        remove_image_leftovers([frame], options.images)
+        remove_image_leftovers(frames, options.images)
 
 
 _NOTES = 3  # on how calibrations were read; the record of the run has those of more files
@@ -142,7 +142,7 @@ def _results(step: Step, plan: Plan, output: Output, stop: Stop) -> Iterator[Ite
     work = Work(
         partial(estimate_frame, options=told),
         partial(lost_frame, options=told),
-        partial(clear_frame, options=told),
+        partial(clear_frames, options=told),
         partial(join_results, options=rows),
         lambda: record.read_as,
         parts.rows if parts else 1,
@@ -155,6 +155,3 @@ def _results(step: Step, plan: Plan, output: Output, stop: Stop) -> Iterator[Ite
             yield results
     finally:
         output.commit()
-        # a worker that died elsewhere cannot be waited for; a retry has removed what is not needed any more
-        if workers.scheduler is not None and not step.retries:
-            remove_image_leftovers(frames, options.images)

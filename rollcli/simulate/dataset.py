@@ -202,8 +202,8 @@ def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = No
         text = json.dumps(dataset.record, indent=2).encode() + b"\n"
         write_atomic(run_path(dataset.folder / TRUTH), text)
     tasks, written = dataset.missing, 0
-    remove_leftovers(path for task in tasks for path in task.files.values())
-    work = Work(_write_frame, _lost, lambda task: remove_leftovers(task.files.values()))
+    work = Work(_write_frame, _lost, _remove_leftovers)
+    work.clear(tasks)
     for stem in run_tasks(tasks, work, stop or Stop(), Workers(jobs)):
         written += 1
         yield stem
@@ -226,6 +226,10 @@ def _write_frame(task: RenderTask) -> str:
 
 def _lost(task: RenderTask, reason: str) -> str:
     raise OutputError(f"{task.files['left']}: cannot be rendered: {reason}; try fewer --jobs")
+
+
+def _remove_leftovers(tasks: Iterable[RenderTask]) -> None:
+    remove_leftovers(path for task in tasks for path in task.files.values())
 
 
 def _nearest_disparity(spec: FrameSpec) -> float:

@@ -81,7 +81,7 @@ class Work(Generic[Task, Result]):
     lost : callable
         Makes the result of a task whose worker died, from the task and the reason.
     clear : callable
-        Removes the half-written files that a worker left which died amid the task.
+        Removes the half-written files that a worker left which died amid one of these tasks.
     join : callable
         Makes of a chunk and the results of its first tasks what the worker hands back of it, as long as there
         are results; pickled as `do` is.
@@ -98,7 +98,7 @@ class Work(Generic[Task, Result]):
 
     do: Callable[[Task], Result]
     lost: Callable[[Task, str], Result]
-    clear: Callable[[Task], None] = lambda task: None  # the tasks write no files
+    clear: Callable[[Iterable[Task]], None] = lambda tasks: None  # the tasks write no files
     join: Callable[[Any, list[Result]], Sized] = _as_they_are
     tell: Callable[[], Any] = lambda: None
     unit: int = 1

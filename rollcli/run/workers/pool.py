@@ -163,8 +163,7 @@ class PoolExecutor(Generic[Task, Result]):
             while self._stopped and worker.in_hand:
                 worker.in_hand.popleft()[1].set_result(Done([], 0.0))
             self._replace(index, worker)
-            for task in begun:
-                self._work.clear(task)
+            self._work.clear(begun)
         else:
             worker.in_hand.popleft()[1].set_result(done)
 

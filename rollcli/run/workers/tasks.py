@@ -119,6 +119,9 @@ def run_joined(
         except KeyboardInterrupt:  # the second Ctrl-C, while they end
             executor.close(at_once=True)
             raise
+        finally:
+            if workers.scheduler is not None:  # a worker that died elsewhere cannot be waited for
+                work.clear(tasks)
 
 
 def require_scheduler(address: str | None) -> None:

@@ -107,7 +107,7 @@ def test_a_worker_that_died_with_nothing_to_do_is_replaced_before_its_next_chunk
 
 def test_what_a_dead_worker_left_is_cleared_before_its_chunk_is_known_to_be_lost(tmp_path):
     cleared = []
-    with pool(1, Work(run, lost, cleared.append)) as executor:
+    with pool(1, Work(run, lost, cleared.extend)) as executor:
         tasks = [("give", 1), ("die_once", tmp_path / "mark"), ("give", 2)]
         dying, spare = executor.submit(tasks), executor.submit([("give", 3)])
         while not dying.done():
