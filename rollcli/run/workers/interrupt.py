@@ -4,7 +4,7 @@ import contextlib
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from types import FrameType
 
 
@@ -32,34 +32,37 @@ def raise_on_signals() -> None:
 
     Later ones are ignored: the program is about to end, and must not be disturbed while it says so.
     """
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        for each in stop_signals():  # not SIG_IGN: of one that came together with this, Python would complain
-            signal.signal(each, lambda number, frame: None)
-        raise KeyboardInterrupt
-
-    def listen() -> None:
-        for number in stop_signals():
-            signal.signal(number, interrupt)
-
-    listen()
-    _where_swallowed(listen)
+    stop = Stop()
+    stop.asked = True
+    _listen(stop)
 
 
-def _where_swallowed(listen: Callable[[], None]) -> None:
-    """Call `listen`, to hear the next signal, where Python swallows a KeyboardInterrupt.
+def _listen(stop: Stop) -> None:
+    """Let the first signal ask to stop, and the next one raise KeyboardInterrupt; ignore those after it.
 
-    It does so in callbacks of weak references and in finalizers, and would print a traceback.
+    Where Python swallows a KeyboardInterrupt, the next signal raises one again. It does so in callbacks of
+    weak references and in finalizers, and would print a traceback.
     """
+
+    def ask(number: int, frame: FrameType | None) -> None:
+        if stop.at_once:
+            return
+        if stop.asked:
+            stop.at_once = True
+            raise KeyboardInterrupt
+        stop.asked = True
+
     usual = sys.unraisablehook
 
     def hook(swallowed: "sys.UnraisableHookArgs") -> None:
         if issubclass(swallowed.exc_type, KeyboardInterrupt):
-            listen()
+            stop.at_once = False
         else:
             usual(swallowed)
 
     sys.unraisablehook = hook
+    for number in stop_signals():
+        signal.signal(number, ask)
 
 
 def came_of_interrupt(error: RuntimeError) -> bool:
@@ -87,25 +90,11 @@ def stop_on_signals() -> Iterator[Stop]:
     about to end, and must not be disturbed while it says how to continue.
     """
     stop = Stop()
-
-    def ask(number: int, frame: FrameType | None) -> None:
-        if stop.at_once:
-            return
-        if stop.asked:
-            stop.at_once = True
-            raise KeyboardInterrupt
-        stop.asked = True
-
     if threading.current_thread() is not threading.main_thread():
         yield stop  # Python lets only the main thread handle signals
         return
-
-    def listen() -> None:
-        stop.at_once = False
-
-    usual = sys.unraisablehook
-    _where_swallowed(listen)
-    before = {number: signal.signal(number, ask) for number in stop_signals()}
+    usual, before = sys.unraisablehook, {number: signal.getsignal(number) for number in stop_signals()}
+    _listen(stop)
     try:
         yield stop
     except RuntimeError as error:
