@@ -435,11 +435,11 @@ def parse_rows(data: bytes, name: str | Path) -> Iterator[Row]:
         They are no result; the line is named.
     """
     names, rows = cells_of(data, str(name), [field.name for field in fields(Row)])
-    absent = {field.name: None for field in fields(Row)}
     for where, *cells in rows:
-        values = absent | dict(zip(names, cells, strict=True))
         place = f"{name}: {where}"
-        yield Row(**{column: value_of(column, value, place) for column, value in values.items()})
+        yield Row(
+            **{column: value_of(column, cell, place) for column, cell in zip(names, cells, strict=True)}
+        )
 
 
 def run_path(path: str | Path) -> str:

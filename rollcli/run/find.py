@@ -5,7 +5,7 @@ import itertools
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
-from pathlib import Path, PurePath, PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, NamedTuple, overload
 
 from rollcli.errors import InputError, UsageError
@@ -119,13 +119,10 @@ class Calibrations:
         """Return the calibration of a frame: of its stem, or of the stem up to one of its underscores."""
         if self._by_stem is None:
             return self._one
-        folder, stem = self._calib[0], PurePosixPath(frame_name(name)).stem
-        shorter = stem  # KITTI's 000010.txt is for 000010_10.png
-        while shorter not in self._by_stem:
-            shorter = shorter.rpartition("_")[0]
-            if not shorter:
-                raise UsageError(f"{name}: has no calibration of its name in {folder}")
-        return self._read(_only(self._by_stem[shorter], "calibration", name))
+        stem = PurePosixPath(frame_name(name)).stem
+        while stem not in self._by_stem and "_" in stem:  # KITTI's 000010.txt is for 000010_10.png
+            stem = stem.rpartition("_")[0]
+        return self._read(_only(self._by_stem, stem, "calibration", name, self._calib[0]))
 
 
 class Masks:
@@ -149,14 +146,14 @@ class Masks:
         """Return the mask of a frame."""
         if self._by_stem is None:
             return self._mask
-        stem = PurePath(frame_name(name)).stem
-        if stem not in self._by_stem:
-            raise UsageError(f"{name}: has no mask of its name in {self._mask}")
-        return _only(self._by_stem[stem], "mask", name)
+        return _only(self._by_stem, PurePosixPath(frame_name(name)).stem, "mask", name, self._mask)
 
 
-def _only(paths: Sequence[str], what: str, name: str) -> str:
+def _only(by_stem: Mapping[str, Sequence[str]], stem: str, what: str, name: str, folder: str | None) -> str:
     """Return the one path of a stem; which of several is meant for a frame, nobody can tell."""
+    paths = by_stem.get(stem, ())
+    if not paths:
+        raise UsageError(f"{name}: has no {what} of its name in {folder}")
     if len(paths) > 1:
         raise UsageError(f"{name}: has more than one {what} of its name: {paths[0]}, {paths[1]}")
     return paths[0]

@@ -329,13 +329,7 @@ def _ignores_case(folder: str) -> bool:
         here = here.parent
     with contextlib.suppress(OSError), os.scandir(here) as entries:
         for entry in entries:
-            if entry.name != entry.name.swapcase():
-                return _same(here / entry.name, here / entry.name.swapcase())
+            other = here / entry.name.swapcase()
+            if other.name != entry.name:
+                return os.path.lexists(other) and os.path.samestat(other.lstat(), os.lstat(entry))
     return here != here.parent and not os.path.ismount(here) and _ignores_case(str(here.parent))
-
-
-def _same(path: Path, other: Path) -> bool:
-    try:
-        return os.path.samestat(path.lstat(), other.lstat())
-    except OSError:
-        return False
