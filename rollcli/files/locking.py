@@ -178,6 +178,11 @@ def take_lock(descriptor: int, name: str) -> None:
         time.sleep(_POLL_S)
 
 
+def exists_already(name: str) -> UsageError:
+    """Make the error that refuses to touch a result unless told how."""
+    return UsageError(f"{name}: exists already; give --resume to continue it or --overwrite to replace it")
+
+
 def not_resumable(name: str, reason: str) -> UsageError:
     """Make the error that refuses to continue a result; its one line says what to do."""
     return UsageError(f"{name}: cannot be resumed: {reason}; --overwrite starts anew")

@@ -113,6 +113,7 @@ def _run_steps(plan: Plan, output: Output, progress: Progress, stop: Stop) -> No
                 if not positions:
                     output.restore(frames, batch)
                     continue
+                output.record.saw(batch.read_as)  # before their rows are written
                 add = output.replace if step.retries else output.append
                 add(positions, frames, batch)
                 progress.add_rows([frame.file for frame in frames], batch.figures, positions, batch.told)

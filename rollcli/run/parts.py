@@ -14,7 +14,7 @@ from rollcli.errors import InputError, UsageError
 from rollcli.extras import require_extra
 from rollcli.files import results
 from rollcli.files.atomic import is_folder, is_there, remove_leftovers, sync_files
-from rollcli.files.locking import locked_folder, not_resumable
+from rollcli.files.locking import exists_already, locked_folder, not_resumable
 from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url, located, public_name
 from rollcli.run.batch import Batch, Parts, Step, line_form, part_location
@@ -37,8 +37,9 @@ class PartsOutput(Output):
         super().__init__(record, kept)
         self._part_rows = record.plan.options.result.part_rows
         output = located(record.plan.options.running.root, record.plan.output)
+        of_rows = {key: value for key, value in record.fixed.items() if key != "inputs"}
         self._parts = Parts(
-            output, self._plan.format, self._plan.further, self._part_rows, (), 0, record.run, record.of_rows
+            output, self._plan.format, self._plan.further, self._part_rows, (), 0, record.run, of_rows
         )
         self._waiting: list[tuple[int, bytes, bytes]] = []  # positions, rows, and the lines of their inputs
         self._images: list[str] = []  # those of the part that is being filled
@@ -57,7 +58,6 @@ class PartsOutput(Output):
         if time.monotonic() - self._checked > _CHECK_S:
             self.record.check_owned()
             self._checked = time.monotonic()
-        self.record.saw(batch.read_as)
         done = batch.in_parts
         self._written += done
         self._waiting += zip(positions[done:], batch.lines, batch.notes, strict=True)
@@ -176,9 +176,7 @@ def check_parts(plan: Plan) -> list[str]:
     resume, overwrite = plan.options.result.resume, plan.options.running.overwrite
     parts = results.part_names(list_names(plan.output))
     if parts and not (resume or overwrite):
-        raise UsageError(
-            f"{plan.output}: exists already; give --resume to continue it or --overwrite to replace it"
-        )
+        raise exists_already(plan.output)
     endings = {name.rpartition(".")[2] for name in parts}
     if resume and parts and endings != {plan.format}:
         raise not_resumable(plan.output, f"its parts are {', '.join(sorted(endings))}, not {plan.format}")

@@ -8,7 +8,7 @@ from itertools import chain, islice
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import is_there, remove_leftovers
-from rollcli.files.locking import not_resumable
+from rollcli.files.locking import exists_already, not_resumable
 from rollcli.files.results import format_header, parse_rows, run_path
 from rollcli.files.stores.locations import base_name
 from rollcli.files.stream import is_stream, open_stream
@@ -60,8 +60,7 @@ class FileOutput(Output):
         self._file, self._inputs, self._rows = file, inputs, DurableRows(file, inputs)
 
     def append(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
-        """Add the rows, after the record knows how their frames were read; they may wait for others."""
-        self.record.saw(batch.read_as)
+        """Add the rows, which may wait for others."""
         images = local_images(frames, batch.figures.status, self._plan.options.images)
         self._rows.append(batch.lines, batch.notes, images)
 
@@ -175,9 +174,7 @@ def _check_permitted(plan: Plan) -> None:
         return
     if has_rows(name):
         if not plan.options.result.resume:
-            raise UsageError(
-                f"{name}: exists already; give --resume to continue it or --overwrite to replace it"
-            )
+            raise exists_already(name)
         if not is_there(inputs_path(name)):
             raise not_resumable(name, f"there is no {base_name(inputs_path(name))}")
         return

@@ -88,11 +88,6 @@ class RunRecord:
         if self._begun:
             check_owned(self.plan.output, self.run)
 
-    @property
-    def of_rows(self) -> dict[str, Any]:
-        """What holds for rows whichever they are: all that was fixed before the run but its inputs."""
-        return {key: value for key, value in self.fixed.items() if key != "inputs"}
-
     def continue_from(self, earlier: Mapping[str, Any]) -> None:
         """Take over what the interrupted run has recorded about its inputs."""
         searched = earlier["disparities_searched_px"]
@@ -465,7 +460,6 @@ class Output:
 
         `commit` writes them all at once.
         """
-        self.record.saw(batch.read_as)
         self._new_rows.update(zip(positions, batch.lines, strict=True))
         self._new_notes.update(zip(positions, batch.notes, strict=True))
         self._take_images(frames, batch.figures.status)
