@@ -137,6 +137,16 @@ def test_what_a_car_leaves_of_the_road_gives_an_angle_beyond_doubt():
     assert (estimate.status, estimate.message) == ("ok", "")
 
 
+def test_a_camera_that_looks_up_need_not_see_much_of_its_road():
+    """The horizon lies 100 rows below the centre; walls beside the lane reach up to the top."""
+    walls = 0.25 / 3 * np.abs(U - 320)
+
+    estimate = estimate_roll(with_noise(np.maximum(0.25 * (V - 340), walls)))
+
+    assert abs(math.degrees(estimate.theta)) < 0.1
+    assert (estimate.status, estimate.message) == ("ok", "")
+
+
 @pytest.mark.parametrize("roll_deg", [-20, 0, 12])
 def test_a_table_is_no_road(roll_deg):
     estimate = estimate_roll(table(roll_deg))

@@ -54,9 +54,12 @@ class Road:
 
     @property
     def horizon(self) -> float:
-        """How far its horizon is from the centre of the image, units: large for a wall or a table."""
+        """How far its horizon is above the centre of the image, units: large for a wall or a table.
+
+        Negative where the camera looks up.
+        """
         c0, c1, c2 = self.plane.tolist()
-        return abs(float(c0)) / math.hypot(c1, c2)
+        return float(c0) / math.hypot(c1, c2)
 
 
 def find_road(sample: Sample, max_roll: float, seed: int, tuning: Tuning) -> Road:
