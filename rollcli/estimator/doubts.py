@@ -152,7 +152,9 @@ def _ground_of(checked: CheckedMap, surface: Surface, rmse: float, reach: float)
     )
     # a plane ends where it has begun: a border, or an own bonnet, that is seen nearer is no end ahead
     begun = np.logical_or.accumulate((on > lower)[::-1])[::-1]
-    some = begun & (in_lane >= _FEW) & (np.arange(_BANDS) + 0.5 >= _BANDS / 2 * at_reach)
+    # nor is it one between road and road: a puddle mirrors the sky, which is far below
+    between = np.append(begun[1:], False) & (np.cumsum(on) > np.cumsum(lower))
+    some = begun & ~between & (in_lane >= _FEW) & (np.arange(_BANDS) + 0.5 >= _BANDS / 2 * at_reach)
     begins = max(at_reach, 2 * farthest / nearest)
     ahead = (near < begins) & (near > begins / 2)
     seen = valid & ahead

@@ -124,6 +124,17 @@ def test_a_border_of_small_disparities_below_the_road_is_no_end_of_it(rows):
     assert (estimate.status, estimate.message) == ("ok", "")
 
 
+@pytest.mark.parametrize("rows", [(300, 340), (330, 400)])
+def test_a_puddle_across_the_lane_is_no_end_of_it(rows):
+    """It mirrors the sky: small disparities, with road before and behind it."""
+    wet = (rows[0] < V) & (rows[1] > V) & (np.abs(U - 320) < 180)
+
+    estimate = estimate_roll(np.where(wet, 2, with_noise(road(4))))
+
+    assert abs(math.degrees(estimate.theta) - 4) < 0.1
+    assert (estimate.status, estimate.message) == ("ok", "")
+
+
 def test_a_mask_that_leaves_the_nearest_road_alone_is_no_end_of_it():
     estimate = estimate_roll(with_noise(road(4)), mask=V > 380)
 
