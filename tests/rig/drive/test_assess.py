@@ -31,6 +31,13 @@ def test_a_jump_is_found_with_its_size_and_the_rig_is_as_it_is_after_it(seed):
     assert [(each.first, each.last) for each in found.segments] == [(0, jump.frame - 1), (jump.frame, 1999)]
 
 
+def test_a_rise_and_a_fall_that_cancel_are_both_found_where_the_first_frames_have_no_angle():
+    values, errors = drive(2, 120, phi=0.0, sd=0.1, errors=(0.02, 0.1))
+    values[60:84] += 0.5
+    values[:24] = np.nan
+    assert [each.frame for each in assess_sequence(values, errors).jumps] == [60, 84]
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_drift_is_found_and_is_no_jump(seed):
     found = assess_sequence(*drive(seed, 4000, drift=1.0, sd=0.1))
