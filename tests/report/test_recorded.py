@@ -481,6 +481,7 @@ CASES = {
         for count, jumps in ((12, [10, 50]), (12, [0, 99]), (4, range(10, 90, 10)), (3, [50]))
     ],
     "chosen of few": lambda: [_chosen(count, (2, 5), _mixed()[0]) for count in (2, 4, 6, 12)],
+    "chosen without intervals": lambda: _chosen(4, rows=[row(f"{i}.png", 1.0, None) for i in range(9)]),
     "subjects": _subjects,
     **{f"looked for {name}": partial(_looked_for, **given) for name, given in INPUTS["looked for"].items()},
     "words": _words,
