@@ -205,7 +205,8 @@ def test_frames_that_are_mended_again_after_a_stopped_retry_get_the_images_of_th
     for index in BROKEN[:2]:
         write_kitti(folder / "maps" / f"frame{index}.png", road_map(0.2, seed=50 + index))
     (folder / "maps" / f"frame{BROKEN[2]}.png").write_bytes(b"broken again")
-    assert rollcli(*line, *RETRY, cwd=folder).status == 3
+    spelled_whole = [f"{folder}/{each}" if each.startswith("rolls.") else each for each in line]
+    assert rollcli(*spelled_whole, *RETRY, cwd=folder).status == 3
     retried = everything(place)
     assert f"up/frame{BROKEN[2]}.png" not in retried
     assert rollcli(*line, "--overwrite", cwd=folder).status == 3
