@@ -235,6 +235,7 @@ def test_python_iterates_the_views_of_a_bag(tmp_path):
         jpeg = cv2.imencode(".jpg", colours, [cv2.IMWRITE_JPEG_QUALITY, 100])[1].tobytes()
         yield "/jpeg/compressed", START, compressed(store, jpeg, "bgr8; jpeg", START)
         yield "/32FC1", START, image(store, np.ones((24, 32), np.float32), "32FC1", START)
+        yield "/late", START, image(store, colours[..., 0], "mono8", START + 9_000_000)
 
     path = write_bag(tmp_path, "drive", "mcap", make)
     for topic in ("/rgb", "/jpeg/compressed"):
@@ -242,6 +243,10 @@ def test_python_iterates_the_views_of_a_bag(tmp_path):
         np.testing.assert_array_equal(frame.right, colours[..., 0])
         assert (frame.stamp, frame.disparity) == (START, None)
         assert np.abs(frame.left.astype(int) - colours).max() <= (2 if "jpeg" in topic else 0)
+    late = {"left_topic": "/rgb", "right_topic": "/late"}
+    assert len(list(package.open_recording(path, **late, sync_tolerance=0.01))) == 1
+    with pytest.raises(UsageError, match="are within 8 ms"):
+        list(package.open_recording(path, **late, sync_tolerance=0.008))
     with pytest.raises(InputError, match=r"/32FC1@\d+: holds float32; a camera image is uint8 or uint16"):
         list(package.open_recording(path, left_topic="/32FC1", right_topic="/grey"))
     with pytest.raises(UsageError, match="left_topic and right_topic are given together"):
@@ -354,6 +359,7 @@ def test_depths_that_are_packed_as_inverses_are_depths(tmp_path):
     def make(store):
         for number, each in enumerate(maps(2)):
             depth = np.where(each > 0, 175 / np.maximum(each, 1e-6), np.inf)
+            depth[0, 0] = 49.99  # which 1 stands for
             stored = np.where(depth < 50, a / depth + b, 0).round().astype(np.uint16)
             packed = struct.pack("<iff", 0, a, b) + cv2.imencode(".png", stored)[1].tobytes()
             stamp = START + number
@@ -363,6 +369,8 @@ def test_depths_that_are_packed_as_inverses_are_depths(tmp_path):
     given = ["--topic", "/z", "--encoding", "depth", *camera, "--derotated", tmp_path / "up"]
     found = rows(rollcli("estimate", path, *given, cwd=tmp_path).out)
     assert [float(row["roll_deg"]) for row in found] == pytest.approx([0, 1], abs=0.05)
+    first, _ = package.open_recording(path, topic="/z", encoding="depth")
+    assert first.disparity[0, 0] == pytest.approx(1 / 50, rel=1e-3)
     for number, each in enumerate(maps(2)):
         np.save(tmp_path / f"{number}.npy", each)
     true = rows(rollcli("estimate", "0.npy", "1.npy", *camera, cwd=tmp_path).out)
