@@ -26,6 +26,7 @@ SERIES = {
     "brief": lambda: drive(1, 40),
     "brief and other": lambda: drive(4, 40, level=1.5, sd=0.1),
     "short": lambda: drive(2, 12),
+    "sixteen with a jump": lambda: drive(0, 16, jump=3.0, at=8, sd=0.1, phi=0.0),
     "seven": lambda: drive(2, 7),
     "a drift": lambda: drive(3, 400, drift=1.5, sd=0.1),
     "a small jump": lambda: drive(5, 500, jump=0.35, phi=0.8, sd=0.1, at=140),
