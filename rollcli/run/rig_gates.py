@@ -5,8 +5,9 @@ of its limit.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -180,11 +181,10 @@ def _reach(parts: Sequence[Estimate], width: int, height: int) -> Estimate:
     """Return the largest shift of the four corners, its interval that of a sum of independent parts."""
     values = [each.value or 0.0 for each in parts]
     value = Misalignment.of_values(values, height, width).reach(height, width)
-    halves = [each.ci95 for each in parts]
-    if None in halves:
+    halves = [each.ci95 for each in parts if each.ci95 is not None]
+    if len(halves) < len(parts):
         return Estimate(value)
-    lower, clockwise, larger, twist = (half or 0.0 for half in halves)
-    shifts = Misalignment.of_values((lower, clockwise, larger, twist), height, width).shifts(height, width)
+    shifts = Misalignment.of_values(halves, height, width).shifts(height, width)
     return Estimate(value, math.hypot(*shifts))
 
 
@@ -259,7 +259,13 @@ def status_of(checks: Sequence[Check]) -> ExitStatus:
     return ExitStatus.UNTOLD if None in states else ExitStatus.DONE
 
 
+_Told = tuple[bool | None, str]  # `ok` and `message` of a check
+
+
 def _checks(rig: RigAssessment, gates: GateOptions, change: Estimate | None) -> Iterator[Check]:
+    def over_drives(told: Callable[..., Iterator[_Told]], *asked: Any) -> list[_Told]:
+        return [each for drive in rig.drives for each in told(rig, drive, *asked)]
+
     height = gates.within if gates.within_height is None else gates.within_height
     for quantity, wanted, within in (
         (ROLL, gates.expect_roll, gates.within),
@@ -267,117 +273,112 @@ def _checks(rig: RigAssessment, gates: GateOptions, change: Estimate | None) -> 
         (HEIGHT, gates.expect_height, height),
     ):
         if wanted is not None and within is not None:
-            name = f"expect-{quantity.name}"
-            found = [_expected(rig, d, quantity, wanted, within) for d in rig.drives]
-            yield _worst(name, [check for each in found for check in each])
+            yield _worst(f"expect-{quantity.name}", over_drives(_expected, quantity, wanted, within))
     if gates.max_drift is not None:
-        yield _worst("max-drift", [_drift(rig, drive, gates.max_drift) for drive in rig.drives])
+        yield _worst("max-drift", over_drives(_drift, gates.max_drift))
     if gates.max_jump is not None:
-        jumps = [_jumps(rig, drive, gates.max_jump) for drive in rig.drives]
+        jumps = over_drives(_jumps, gates.max_jump)
         if change is not None:
-            jumps.append(_limited("max-jump", "change against the other result", change, gates.max_jump))
+            jumps.append(_limited("change against the other result", change, gates.max_jump))
         yield _worst("max-jump", jumps)
     if gates.max_misalignment is not None:
-        shifts = [check for drive in rig.drives for check in _shifts(rig, drive, gates.max_misalignment)]
-        no_pair = Check("max-misalignment", None, "how the views lie: no pair was measured")
-        yield _worst("max-misalignment", shifts or [no_pair])
+        shifts = over_drives(_shifts, gates.max_misalignment)
+        yield _worst("max-misalignment", shifts or [(None, "how the views lie: no pair was measured")])
     if gates.min_ok is not None:
-        yield _share(rig, gates.min_ok)
+        yield Check("min-ok", *_share(rig, gates.min_ok))
 
 
-def _worst(name: str, checks: list[Check]) -> Check:
+def _worst(name: str, told: Sequence[_Told]) -> Check:
     """All drives as one check: what is violated, or else what cannot be told."""
     for state in (False, None):
-        chosen = [check for check in checks if check.ok is state]
+        chosen = dict.fromkeys(message for ok, message in told if ok is state)
         if chosen:
-            return Check(name, state, "; ".join(dict.fromkeys(check.message for check in chosen)))
-    return checks[-1] if checks else Check(name, None, "there are no frames")
+            return Check(name, state, "; ".join(chosen))
+    return Check(name, *(told[-1] if told else (None, "there are no frames")))
 
 
 def _expected(
     rig: RigAssessment, drive: DriveAssessment, quantity: Quantity, wanted: float, within: float
-) -> Iterator[Check]:
-    """Yield a check of the last segment, and where it drifts one of each of its ends."""
-    name = f"expect-{quantity.name}"
+) -> Iterator[_Told]:
+    """Tell of the last segment, and where it drifts of each of its ends."""
     found = drive.quantities.get(quantity.name)
     if found is None or not found.used:
-        yield Check(name, None, f"the {quantity.name} of {_frames(rig, drive)} is unknown: no frame counts")
+        yield None, f"the {quantity.name} of {_frames(rig, drive)} is unknown: no frame counts"
         return
-    last = found.segments[-1]
-    ends = [(last.first, last.last, last.mean)]
-    if found.drifts:
-        ends = [(last.first, last.first, last.begin), (last.last, last.last, last.end)]
-    for first, end, value in ends:
-        of = f"{'at' if found.drifts else 'of'} {_frames(rig, drive, first, end)}"
-        what = f"the {quantity.name} {of} is {answer(value, quantity)}"
+    for frames, (value,) in _ends(rig, drive, [found]):
+        of = "at" if found.drifts else "of"
+        what = f"the {quantity.name} {of} {frames} is {answer(value, quantity)}"
         limit = f"{within:g}{quantity.unit} from {wanted:g}{quantity.unit}"
         off = difference(Estimate(wanted, 0.0), value, quantity)
-        yield _told(name, what, off, within, limit, too_few(found, quantity))
+        yield _compared(what, off, within, limit, too_few(found, quantity))
 
 
-def _told(name: str, what: str, found: Estimate, most: float, limit: str, why: str) -> Check:
+def _ends(
+    rig: RigAssessment, drive: DriveAssessment, found: Sequence[SequenceAssessment]
+) -> Iterator[tuple[str, list[Estimate]]]:
+    """Yield the frames since the last jump, and what they say; where anything drifts, each end of them."""
+    last = [each.segments[-1] for each in found]
+    first, end = max(each.first for each in last), last[0].last
+    if any(each.drifts for each in found):
+        yield _frames(rig, drive, first, first), [each.begin for each in last]
+        yield _frames(rig, drive, end, end), [each.end for each in last]
+    else:
+        yield _frames(rig, drive, first, end), [each.mean for each in last]
+
+
+def _compared(what: str, found: Estimate, most: float, limit: str, why: str) -> _Told:
     """Compare with a limit how large an estimate is, either way; `why`: it may have no interval."""
     if found.value is None or found.ci95 is None:
-        return Check(name, None, f"{what}: {why}")
+        return None, f"{what}: {why}"
     off = abs(found.value)
     if off + found.ci95 <= most:
-        return Check(name, True, f"{what}, at most {limit}")
+        return True, f"{what}, at most {limit}"
     if off - found.ci95 > most:
-        return Check(name, False, f"{what}, more than {limit}")
-    return Check(name, None, f"{what}, which may be more or less than {limit}")
+        return False, f"{what}, more than {limit}"
+    return None, f"{what}, which may be more or less than {limit}"
 
 
-def _drift(rig: RigAssessment, drive: DriveAssessment, limit: float) -> Check:
+def _drift(rig: RigAssessment, drive: DriveAssessment, limit: float) -> Iterator[_Told]:
     found = drive.quantities[ROLL.name]
-    return _limited("max-drift", f"drift over {_frames(rig, drive)}", found.drift, limit, too_few(found))
+    yield _limited(f"drift over {_frames(rig, drive)}", found.drift, limit, too_few(found))
 
 
-def _jumps(rig: RigAssessment, drive: DriveAssessment, limit: float) -> Check:
-    found, name = drive.quantities[ROLL.name], "max-jump"
-    frames = _frames(rig, drive)
-    if not found.jumps:
-        if found.now.ci95 is None:
-            return Check(name, None, f"the jumps of {frames}: {too_few(found)}")
-        return Check(name, True, f"{frames} hold no jump")
-    checks = [
-        _limited(name, f"jump at {frame_name(rig, drive, jump.frame)}", jump.change, limit)
-        for jump in found.jumps
-    ]
-    return _worst(name, checks)
+def _jumps(rig: RigAssessment, drive: DriveAssessment, limit: float) -> Iterator[_Told]:
+    found = drive.quantities[ROLL.name]
+    for jump in found.jumps:
+        yield _limited(f"jump at {frame_name(rig, drive, jump.frame)}", jump.change, limit)
+    if not found.jumps and found.now.ci95 is None:
+        yield None, f"the jumps of {_frames(rig, drive)}: {too_few(found)}"
+    elif not found.jumps:
+        yield True, f"{_frames(rig, drive)} hold no jump"
 
 
-def _limited(name: str, what: str, found: Estimate, limit: float, why: str = "too few frames") -> Check:
-    """Check a change that must not be larger than a limit."""
-    return _told(name, f"the {what} is {answer(found, change=True)}", found, limit, f"{limit:g}°", why)
+def _limited(what: str, found: Estimate, limit: float, why: str = "too few frames") -> _Told:
+    """Tell of a change that must not be larger than a limit."""
+    return _compared(f"the {what} is {answer(found, change=True)}", found, limit, f"{limit:g}°", why)
 
 
-def _shifts(rig: RigAssessment, drive: DriveAssessment, limit: float) -> Iterator[Check]:
-    """Yield a check of the pairs since the last jump, and where they drift one of each end; none without."""
+def _shifts(rig: RigAssessment, drive: DriveAssessment, limit: float) -> Iterator[_Told]:
+    """Tell of the pairs since the last jump, and where they drift of each end; of nothing without pairs."""
     measured = _measured(rig, drive)
     if measured is None:
         return
     quantities, size = measured
-    last = [each.segments[-1] for each in quantities]
-    first, end = max(each.first for each in last), last[0].last
-    ends = [(first, end, [each.end for each in last])]
-    if any(each.drifts for each in quantities):
-        ends = [(first, first, [each.begin for each in last]), (end, end, [each.end for each in last])]
-    for begin, until, parts in ends:
+    for frames, parts in _ends(rig, drive, quantities):
         reach = _reach(parts, *size)
-        views = f"the views of {_frames(rig, drive, begin, until)}"
-        what = f"the largest vertical shift between {views} is {answer(reach, PIXELS)}"
-        yield _told("max-misalignment", what, reach, limit, f"{limit:g} px", "too few pairs for an interval")
+        what = f"the largest vertical shift between the views of {frames} is {answer(reach, PIXELS)}"
+        yield _compared(what, reach, limit, f"{limit:g} px", "too few pairs for an interval")
 
 
-def _share(rig: RigAssessment, least: float) -> Check:
+def _share(rig: RigAssessment, least: float) -> _Told:
     ok = int(rig.frames.ok.sum())
     share = ok / rig.count if rig.count else 0.0
     message = f"{ok:,} of {rig.count:,} frames are ok, {100 * share:.4g} %"
     if rig.count and share >= least:
-        return Check("min-ok", True, message)
+        return True, message
     others = [rig.names[place] for place in np.flatnonzero(~rig.frames.ok).tolist()]
     named = f"; not: {listed(others)}" if others else ""
-    return Check("min-ok", False, f"{message}, fewer than {100 * least:.4g} %{named}")
+    return False, f"{message}, fewer than {100 * least:.4g} %{named}"
 
 
 def _frames(rig: RigAssessment, drive: DriveAssessment, first: int = 0, last: int = -1) -> str:
