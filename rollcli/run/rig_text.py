@@ -7,9 +7,8 @@ from typing import Any
 
 from rollcli.errors import UsageError
 from rollcli.files.results import csv_table
-from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
+from rollcli.rig.drive.assess import RigAssessment
 from rollcli.rig.drive.posterior import Estimate
-from rollcli.rig.drive.quantity import Segment
 from rollcli.rig.quantities import ALIGNMENT, QUANTITIES, ROLL, Quantity
 from rollcli.rig.words import answer, counts, drift_in_words, findings, frame_name, now_in_words
 from rollcli.run.rig_gates import DISTANCES, NOT_SEEN, Check, Health
@@ -51,9 +50,7 @@ def rig_values(found: "Findings") -> dict[str, Any]:
         values |= named(prefix, hourly, f"{quantity.suffix}_per_hour")
     for quantity in QUANTITIES:
         values["jumps" if quantity is ROLL else f"{quantity.name}_jumps"] = _jumps(rig, quantity)
-    values["segments"] = [
-        _segment(rig, drive, place) for drive in rig.drives for place in range(len(_segments(drive)))
-    ]
+    values["segments"] = [{name: row[name] for name in _OF_JSON} for row in segment_rows(rig)]
     values["alignment"] = None if found.health is None else alignment_values(found.health)
     if found.after is not None:
         values["against"] = _against(found.after, found.changes)
@@ -82,59 +79,50 @@ def _jumps(rig: RigAssessment, quantity: Quantity) -> list[dict[str, Any]]:
     return found
 
 
-def _segments(drive: DriveAssessment) -> Sequence[Segment]:
-    return drive.quantities[ROLL.name].segments
-
-
-def _segment(rig: RigAssessment, drive: DriveAssessment, place: int) -> dict[str, Any]:
-    """One segment of the roll, with the other quantities over the same frames."""
-    roll = _segments(drive)[place]
-    frames = drive.frames[roll.first : roll.last + 1]
-    values: dict[str, Any] = {
-        "drive": drive.name,
-        "first": int(frames[0]),
-        "last": int(frames[-1]),
-        "frames": len(frames),
-        "used": roll.used,
-        "suspect": int(rig.frames.suspect[frames].sum()),
-    }
-    starts = drive.quantities[ROLL.name].starts
-    for quantity in QUANTITIES:
-        found = drive.quantities.get(quantity.name)
-        mean = roll.mean if quantity is ROLL else found.means(starts)[place] if found else Estimate()
-        values |= named(quantity.name, mean, quantity.suffix)
-    return values
-
-
-_SEGMENT_COLUMNS = (
+_OF_JSON = (
     *("drive", "first", "last", "frames", "used", "suspect", "roll_deg", "roll_ci95_deg", "pitch_deg"),
-    *("pitch_ci95_deg", "height_m", "height_ci95_m", "first_file", "last_file", "between_frames_sd_deg"),
-    *("drift_deg", "drift_ci95_deg", "drift_deg_per_hour", "drift_ci95_deg_per_hour"),
-    *("change_deg", "change_ci95_deg", "status"),
+    *("pitch_ci95_deg", "height_m", "height_ci95_m"),
+)
+_OF_CSV = (
+    *(*_OF_JSON, "first_file", "last_file", "between_frames_sd_deg", "drift_deg", "drift_ci95_deg"),
+    *("drift_deg_per_hour", "drift_ci95_deg_per_hour", "change_deg", "change_ci95_deg", "status"),
 )
 
 
-def segment_rows(rig: RigAssessment) -> list[dict[str, Any]]:
-    """Return the segments with what else is known of their drive: the lines of the CSV."""
-    rows = []
+def segment_rows(rig: RigAssessment) -> Iterator[dict[str, Any]]:
+    """Yield of each segment of the roll what is known of it and of its drive: the lines of the CSV.
+
+    The other quantities are those over the same frames.
+    """
     for drive in rig.drives:
-        found = drive.quantities[ROLL.name]
-        for place in range(len(found.segments)):
-            segment = _segment(rig, drive, place)
-            change = found.jumps[place - 1].change if place else drive.change
-            rows.append(
-                {
-                    **segment,
-                    "first_file": rig.frames.files[segment["first"]],
-                    "last_file": rig.frames.files[segment["last"]],
-                    "between_frames_sd_deg": rounded(found.between_sd),
-                    **named("drift", found.drift),
-                    **named("drift", rig.drift_per_hour(drive), "deg_per_hour"),
-                    **named("change", change),
-                    "status": found.status,
-                }
-            )
-    return rows
+        roll = drive.quantities[ROLL.name]
+        means = {ROLL.name: [each.mean for each in roll.segments]}
+        for name in {each.name for each in QUANTITIES[1:]} & drive.quantities.keys():
+            means[name] = drive.quantities[name].means(roll.starts)
+        for place, segment in enumerate(roll.segments):
+            frames = drive.frames[segment.first : segment.last + 1]
+            first, last = int(frames[0]), int(frames[-1])
+            row: dict[str, Any] = {
+                "drive": drive.name,
+                "first": first,
+                "last": last,
+                "frames": len(frames),
+                "used": segment.used,
+                "suspect": int(rig.frames.suspect[frames].sum()),
+            }
+            for quantity in QUANTITIES:
+                mean = means[quantity.name][place] if quantity.name in means else Estimate()
+                row |= named(quantity.name, mean, quantity.suffix)
+            yield {
+                **row,
+                "first_file": rig.frames.files[first],
+                "last_file": rig.frames.files[last],
+                "between_frames_sd_deg": rounded(roll.between_sd),
+                **named("drift", roll.drift),
+                **named("drift", rig.drift_per_hour(drive), "deg_per_hour"),
+                **named("change", roll.jumps[place - 1].change if place else drive.change),
+                "status": roll.status,
+            }
 
 
 def _against(after: RigAssessment, changes: dict[str, Estimate]) -> dict[str, Any]:
@@ -187,9 +175,8 @@ def as_table(found: Findings) -> str:
 
 def as_csv(found: Findings) -> str:
     """Return a header, and a line for each segment."""
-    rows = segment_rows(found.rig)
-    lines = csv_table([_SEGMENT_COLUMNS, *([row[name] for name in _SEGMENT_COLUMNS] for row in rows)])
-    return lines.decode("utf-8", "surrogateescape")
+    rows = ([row[name] for name in _OF_CSV] for row in segment_rows(found.rig))
+    return csv_table([_OF_CSV, *rows]).decode("utf-8", "surrogateescape")
 
 
 def as_json(found: Findings) -> str:
