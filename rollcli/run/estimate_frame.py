@@ -41,7 +41,7 @@ def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
 def _estimate(frame: Frame, options: FrameOptions, images: dict[str, bytes]) -> FrameResult:
     """Make the row, and last the images: a frame that fails has none."""
     source = read_source(frame, options)
-    calibration = _calibration(frame, source)
+    calibration = source.calibrated(frame.calibration)
     estimate, likeness = _estimate_roll(source, options, calibration)
     # the images are turned by the angle of the pixels, which is not the rig's where fx and fy differ
     made, note = encode_images(frame, Pictured(source, estimate, options, calibration))
@@ -65,17 +65,6 @@ def _estimate_roll(
         raise EstimationError(f"{likeness}; {error}" if likeness else str(error), likeness) from error
     doubtful = estimate.status != "ok"
     return estimate, looks_like(source.disparity, source.stored, options) if doubtful else ""
-
-
-def _calibration(frame: Frame, source: Source) -> Calibration | None:
-    """Scale the frame's calibration from its images to its map."""
-    if frame.calibration is None:
-        return None
-    calibration = frame.calibration
-    if source.size is not None:
-        calibration = calibration.for_size(*source.size)
-    height, width = source.disparity.shape
-    return calibration.for_size(width, height)
 
 
 def _row(frame: Frame, source: Source, estimate: RollEstimate, note: str, likeness: str) -> Row:

@@ -213,7 +213,9 @@ def _counted(source: Source, of: Frame, options: VDisparityOptions, paths: Seque
         likeness = looks_like(source.disparity, source.stored, options.frame)
     else:
         curve = profile(estimate.alpha, estimate.theta, estimate.width)
-        horizon = _horizon(estimate, of.calibration)
+        if (calibration := source.calibrated(of.calibration)) is not None:
+            y = horizon_row(estimate.tangent, calibration)
+            horizon = None if y is None else middle_row(y, estimate.theta, estimate.width)
     files = [encode_png(draw_v_disparity(histogram, curve, horizon=horizon))]
     if options.counts:
         files.append(encode_stored(histogram.counts, "tiff"))
@@ -229,18 +231,10 @@ def _sure_estimate(source: Source) -> RollEstimate | None:
     return estimate if estimate.status == "ok" else None
 
 
-def _horizon(estimate: RollEstimate, calibration: Calibration | None) -> float | None:
-    """Return the row of the horizon on the middle column; None without a calibration."""
-    if calibration is None:
-        return None
-    y = horizon_row(estimate.tangent, calibration.for_size(estimate.width, estimate.height))
-    return None if y is None else middle_row(y, estimate.theta, estimate.width)
-
-
 def _heights_of_row(source: Source, frame: Frame, options: HeightsOptions, paths: Sequence[str]) -> _Made:
     """Measure the heights of the map over the road of its row, and draw them if that was requested."""
     height, width = source.disparity.shape
-    calibration = None if frame.calibration is None else frame.calibration.for_size(width, height)
+    calibration = source.calibrated(frame.calibration)
     road = None if frame.row is None else FittedRoad.of_row(frame.row, calibration)
     if road is None:
         raise InputError(f"{frame.file}: its row in {options.result} has no road (alpha0, alpha1, alpha2)")

@@ -194,10 +194,8 @@ def estimate_pair(
     if allowed is not None and not allowed.any():
         raise UsageError("the mask leaves no pixel of the map: give an array that is not all zero")
     source = matched_source(left, right, stereo or StereoOptions(), wanted_of(allowed, request))
-    request = replace(request, slope_error=source.slope_error)
-    if rig is not None:
-        rig = rig.for_size(*left.shape[1::-1]).for_size(*source.disparity.shape[::-1])
-        request = replace(request, middle=rig.cx)
+    rig = source.calibrated(rig)
+    request = replace(request, slope_error=source.slope_error, middle=None if rig is None else rig.cx)
     estimate = estimator.estimate_roll(source.disparity, request, mask=allowed, road_mask=road_mask)
     message = "; ".join(filter(None, [estimate.message, source.doubt, source.note]))
     estimate = replace(estimate, status="suspect" if source.doubt else estimate.status, message=message)

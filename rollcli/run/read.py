@@ -21,6 +21,7 @@ from rollcli.files.formats import Stored, decode_mask, read_image, read_stored
 from rollcli.files.results import ALIGNMENT_COLUMNS
 from rollcli.files.storage import noting, read_bytes, state_of
 from rollcli.messages import one_line
+from rollcli.rig.calibration import Calibration
 from rollcli.run.diagnosis import require_positive, too_large
 from rollcli.run.frame import Decoded, Frame, FrameResult, failed_frame
 from rollcli.run.options import FrameOptions, RegionOptions
@@ -137,6 +138,18 @@ class Source:
         if not (self.slope_error or self.doubt or self.alignment):
             return ""
         return json.dumps({"slope_error": self.slope_error, "doubt": self.doubt, "alignment": self.alignment})
+
+    def calibrated(self, calibration: Calibration | None) -> Calibration | None:
+        """Scale a calibration of the images in the files to the map; none stays none.
+
+        Raises
+        ------
+        UsageError
+            It is of another view: see `Calibration.for_size`.
+        """
+        if calibration is not None and self.size is not None:
+            calibration = calibration.for_size(*self.size)
+        return calibration and calibration.for_size(*self.disparity.shape[::-1])
 
     @property
     def shown(self) -> NDArray[Any]:
