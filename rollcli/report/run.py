@@ -20,7 +20,7 @@ from rollcli.run.options import EncodingOptions
 from rollcli.run.outputs import check_named_once, listed_only
 from rollcli.run.progress import Progress
 from rollcli.run.resume import recorded_calibrations, recorded_options
-from rollcli.run.rig import order_of, origins_of
+from rollcli.run.rig import order_of
 from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import stop_on_signals
 from rollcli.run.workers.tasks import run_tasks
@@ -60,11 +60,13 @@ def run_report(options: ReportOptions) -> ExitStatus:
             raise InputError(f"{path}: has no rows: there is nothing to report")
     # all rows in the order of the run, or one result after the other; a shard alone may be shown
     owned = [(number, row) for number, part in enumerate(parts) for row in part.rows]
+    origins = list[str]()
     if len(parts) > 1:
-        owned = [owned[place] for place in order_of(parts).tolist()]
+        order, origins = order_of(parts)
+        owned = [owned[place] for place in order]
     owners, rows = zip(*owned, strict=True)
     result = Result(rows, common_run([part.run for part in parts]))
-    rig = assess_rig(rows, origins=origins_of(parts))
+    rig = assess_rig(rows, origins=origins)
     jumps = [
         int(drive.frames[jump.frame])
         for drive in rig.drives

@@ -59,7 +59,7 @@ def _assessed(paths: Sequence[str], options: RigOptions) -> tuple[RigAssessment,
     if len(methods) > 1:
         names = listed(part.path for part in parts)
         raise UsageError(f"{names}: rows of the methods {', '.join(methods)}: assess each method by itself")
-    order = order_of(parts)
+    order, origins = order_of(parts)
     joined = [file for part in parts for file in part.files]
     status = np.concatenate([part.status for part in parts])[order]
     frames = RigFrames(
@@ -67,7 +67,7 @@ def _assessed(paths: Sequence[str], options: RigOptions) -> tuple[RigAssessment,
         status == STATUSES.index("ok"),
         status == STATUSES.index("suspect"),
         {name: _joined(parts, name)[order] for name in COLUMNS if any(name in p.numbers for p in parts)},
-        origins_of(parts),
+        origins,
     )
     rig = assess_frames(frames, include_suspect=options.include_suspect, groups=options.groups)
     missing = _unfinished(parts)
@@ -81,29 +81,24 @@ def _joined(parts: Sequence[ResultColumns], name: str) -> NDArray[np.float64]:
 Part = Result | ResultColumns  # one of several that are put together
 
 
-def are_whole(parts: Sequence[Part]) -> bool:
-    """Tell whether there are several results, each of a whole run."""
+def order_of(parts: Sequence[Part]) -> tuple[NDArray[np.intp], list[str]]:
+    """Put the rows of results in order.
+
+    Returns
+    -------
+    ndarray of int, list of str
+        The places of all rows, one part after the other, in the order of the run; and the name of the result
+        of each row, where there are several and each is of a whole run, else nothing.
+    """
     shards = [_shard(part) for part in parts]
-    return len(parts) > 1 and (1, 1) in shards and all(each in (None, (1, 1)) for each in shards)
-
-
-def origins_of(parts: Sequence[Part]) -> list[str]:
-    """Return the name of the result of each row, one part after the other; nothing unless they are whole."""
-    if not are_whole(parts):
-        return []
-    names = [base_name(part.path) for part in parts]
-    if len(set(names)) < len(names):
-        names = short_names([part.path for part in parts])
-    return [name for name, part in zip(names, parts, strict=True) for _ in part.files]
-
-
-def order_of(parts: Sequence[Part]) -> NDArray[np.intp]:
-    """Return the places of all rows, one part after the other, in the order of the run."""
-    shards = [_shard(part) for part in parts]
-    if are_whole(parts) or (len(parts) == 1 and shards[0] in (None, (1, 1))):
-        return np.arange(sum(len(part.files) for part in parts))
+    if set(shards) <= {None, (1, 1)} and (len(parts) == 1 or (1, 1) in shards):
+        names = [base_name(part.path) for part in parts]
+        if len(set(names)) < len(names):
+            names = short_names([part.path for part in parts])
+        origins = [name for name, part in zip(names, parts, strict=True) for _ in part.files]
+        return np.arange(len(origins)), origins if len(parts) > 1 else []
     if all(shard is None for shard in shards):
-        return _by_name(parts)
+        return _by_name(parts), []
     for part, shard in zip(parts, shards, strict=True):
         if shard is None:
             raise UsageError(
@@ -113,7 +108,7 @@ def order_of(parts: Sequence[Part]) -> NDArray[np.intp]:
     _check_shards(parts, known)
     apart = 0 if _options(parts[0].run).get("shard-by") == "range" else known[0][1]
     places = [index + apart * np.arange(len(p.files)) for p, (index, _) in zip(parts, known, strict=True)]
-    return np.argsort(np.concatenate(places), kind="stable")
+    return np.argsort(np.concatenate(places), kind="stable"), []
 
 
 def _check_shards(parts: Sequence[Part], shards: Sequence[tuple[int, int]]) -> None:
