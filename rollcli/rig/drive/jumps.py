@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rollcli.rig.drive.posterior import TUNING, Cells, Fit, Flags, Floats, Likelihood, Series, make_cells
+from rollcli.rig.drive.posterior import TUNING, Fit, Flags, Likelihood, Series, make_cells
 
 _SIDE = 2.5  # cells on each side of a jump that are looked at again
 _FEWEST = 60  # frames on each side: what is beside a jump tells its levels
@@ -31,19 +31,6 @@ class Found:
     score: float
 
 
-def design_of(cells: Cells, starts: Sequence[int], drift: bool, frames: int) -> Floats:
-    """Return a level for each stretch at the last frame, and the drift over the drive if asked for."""
-    columns = cells.levels(starts)
-    if not drift:
-        return columns
-    return np.column_stack([columns, (cells.centres - (frames - 1)) / max(frames - 1, 1)])
-
-
-def is_told(design: Floats) -> bool:
-    """Tell whether the cells are enough for every column: frames that count may all lie in a cell or two."""
-    return bool(np.linalg.matrix_rank(design) == design.shape[1])
-
-
 def search(series: Series, unit: float) -> Found:
     """Find the jumps of a series, and whether it drifts.
 
@@ -64,18 +51,16 @@ def search(series: Series, unit: float) -> Found:
     places = np.flatnonzero(series.used)
     spanned = 2 * (places[-1] - places[0]) >= len(series.values)  # else a line would be drawn out far
     found = max((seen.jumps(drift) for drift in (False, True)[: 1 + spanned]), key=lambda each: each.score)
-    return Found(tuple(_placed(series, found, unit, seen.width)), found.drift, found.score)
+    return Found(tuple(_placed(series, found, unit, seen.cells.width)), found.drift, found.score)
 
 
 class _Search:
     """Adds jumps one by one or two by two as long as the score grows, and takes needless ones away."""
 
     def __init__(self, series: Series, unit: float) -> None:
-        self._frames = len(series.values)
-        cells = make_cells(series)
-        self.width, self._first = cells.width, cells.first
-        self._likelihood = Likelihood(cells, unit)
-        self._gap = max(TUNING.shortest, TUNING.shortest_share * self._frames)
+        self.cells = make_cells(series)
+        self._likelihood = Likelihood(self.cells, unit)
+        self._gap = max(TUNING.shortest, TUNING.shortest_share * self.cells.frames)
 
     def jumps(self, drift: bool) -> Found:
         """Return the best jumps with a drift, or without."""
@@ -96,11 +81,8 @@ class _Search:
             best = less
         return best
 
-    def _design(self, starts: Sequence[int], drift: bool) -> Floats:
-        return design_of(self._likelihood.cells, starts, drift, self._frames)
-
     def _fit(self, starts: Sequence[int], drift: bool) -> Fit:
-        return self._likelihood.fit(self._design(starts, drift))
+        return self._likelihood.fit(self.cells.design(starts, drift))
 
     def _scored(self, starts: Sequence[int], drift: bool) -> Found:
         penalty = TUNING.jump_penalty * len(starts) + TUNING.drift_penalty * drift
@@ -108,30 +90,30 @@ class _Search:
 
     def _proposals(self, found: Found) -> list[tuple[int, ...]]:
         """Return what is there with the step that tells most, and with the two that do."""
-        design, fit = self._design(found.starts, found.drift), self._fit(found.starts, found.drift)
+        design, first = self.cells.design(found.starts, found.drift), self.cells.first
+        fit = self._likelihood.fit(design)
         # far enough from the others and from both ends
-        edges = np.array([0, *found.starts, self._frames])
-        allowed: Flags = np.abs(self._first[:, None] - edges).min(axis=1) >= self._gap
+        edges = np.array([0, *found.starts, self.cells.frames])
+        allowed: Flags = np.abs(first[:, None] - edges).min(axis=1) >= self._gap
         if not allowed.any():
             return []
         one = np.where(allowed, self._likelihood.scan(design, fit), -np.inf)
-        both = np.abs(self._first[:, None] - self._first) >= self._gap
+        both = np.abs(first[:, None] - first) >= self._gap
         both &= allowed[:, None] & allowed
         two = np.where(both, self._likelihood.pairs(design, fit), -np.inf)
         places = [[int(one.argmax())]]
         if both.any():
             places.append([int(each) for each in np.unravel_index(int(two.argmax()), two.shape)])
-        return [tuple(sorted([*found.starts, *(int(self._first[at]) for at in each)])) for each in places]
+        return [tuple(sorted([*found.starts, *(int(first[at]) for at in each)])) for each in places]
 
     def _lasts(self, found: Found, start: int) -> bool:
         """Tell whether the level after a jump stays changed, rather than being a kick that fades."""
         others = [each for each in found.starts if each != start]
-        cells = self._likelihood.cells
-        after = (cells.centres - start) / cells.width
+        after = (self.cells.centres - start) / self.cells.width
         fit = self._fit(others, found.drift)
         at = int(np.unravel_index(int(fit.log_evidence.argmax()), fit.log_evidence.shape)[0])
         fading = np.where(after >= 0, TUNING.correlations[at] ** np.maximum(after, 0), 0.0)
-        kicked = self._likelihood.fit(np.column_stack([self._design(others, found.drift), fading]))
+        kicked = self._likelihood.fit(np.column_stack([self.cells.design(others, found.drift), fading]))
         return found.score >= kicked.evidence - TUNING.jump_penalty * len(found.starts) - (
             TUNING.drift_penalty * found.drift
         )

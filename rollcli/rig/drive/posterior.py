@@ -13,6 +13,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,6 +157,8 @@ class Cells:
     width : int
         Frames of a cell.
     values, variances : ndarray of float, shape (C,)
+    frames : int
+        Of the drive.
     """
 
     first: NDArray[np.intp]
@@ -163,12 +166,20 @@ class Cells:
     width: int
     values: Floats
     variances: Floats
+    frames: int
 
-    def levels(self, starts: Sequence[int]) -> Floats:
-        """Return a column for each stretch between frames at which a jump is, shape (C, stretches)."""
+    def design(self, starts: Sequence[int], drift: bool) -> Floats:
+        """Return the level at the last frame of each stretch between jumps, shape (C, stretches).
+
+        If asked for, the drift over the drive is a further column.
+        """
         stretch = np.searchsorted(np.asarray(starts), self.first, side="right")
         columns: Floats = (stretch[:, None] == np.arange(len(starts) + 1)).astype(float)
-        return columns
+        return np.column_stack([columns, self.share(self.centres)]) if drift else columns
+
+    def share(self, frame: Any) -> Any:
+        """Return the share of the drive that lies between its last frame and this one; of frames alike."""
+        return (frame - (self.frames - 1)) / max(self.frames - 1, 1)
 
 
 def make_cells(series: Series, starts: Sequence[int] = (), most: int = TUNING.cells) -> Cells:
@@ -185,7 +196,7 @@ def make_cells(series: Series, starts: Sequence[int] = (), most: int = TUNING.ce
         np.add.reduceat(weights * each, edges)[there] / total[there] for each in (series.values, frames)
     )
     variances = np.add.reduceat(weights**2 * series.variances, edges)[there] / total[there] ** 2
-    return Cells(edges[there], centres, width, values, variances)
+    return Cells(edges[there], centres, width, values, variances, count)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -238,7 +249,6 @@ class Likelihood:
     """
 
     def __init__(self, cells: Cells, unit: float = 1.0) -> None:
-        self.cells = cells
         places = cells.centres / cells.width
         distance = np.abs(places[:, None] - places)
         correlations = np.array(TUNING.correlations)[:, None, None] ** distance

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike
 
-from rollcli.rig.drive.jumps import bounds_of, design_of, is_told, search
+from rollcli.rig.drive.jumps import bounds_of, search
 from rollcli.rig.drive.posterior import TUNING, Estimate, Fit, Flags, Floats, Likelihood, Series, make_cells
 
 Status = Literal["stable", "drift", "jump", "few"]
@@ -168,11 +168,11 @@ class _Fitted:
 
     def __init__(self, series: Series, starts: Sequence[int], drift: bool, unit: float) -> None:
         self._series, self._starts, self._drift = series, starts, drift
-        self._frames = len(series.values)
         self._cells = make_cells(series, starts)
-        design = design_of(self._cells, starts, drift, self._frames)
+        design = self._cells.design(starts, drift)
         self._there: Flags = np.asarray(design.any(axis=0))  # a stretch may have no frame that counts
-        if drift and not is_told(design[:, self._there]):
+        # frames that count may all lie in a cell or two, which do not tell a drift
+        if drift and np.linalg.matrix_rank(design[:, self._there]) < self._there.sum():
             self._there[-1] = False
         self._fit: Fit = Likelihood(self._cells, unit).fit(design[:, self._there])
 
@@ -181,7 +181,7 @@ class _Fitted:
         row = np.zeros(len(self._there))
         row[place] = 1
         if self._drift:
-            row[-1] = (frame - (self._frames - 1)) / max(self._frames - 1, 1)
+            row[-1] = self._cells.share(frame)
         return row
 
     def estimate(self, contrast: Floats) -> Estimate:
@@ -201,14 +201,14 @@ class _Fitted:
         """Return the stretches with their values."""
         return [
             Segment(first, end - 1, int(self._series.used[first:end].sum()), *self._values(place, first, end))
-            for place, (first, end) in enumerate(bounds_of(self._starts, self._frames))
+            for place, (first, end) in enumerate(bounds_of(self._starts, self._cells.frames))
         ]
 
     def mean_over(self, first: int, end: int) -> Estimate:
         """Return the mean of frames whose ends are ends of stretches."""
         within = {
             place: int(self._series.used[begin:stop].sum())
-            for place, (begin, stop) in enumerate(bounds_of(self._starts, self._frames))
+            for place, (begin, stop) in enumerate(bounds_of(self._starts, self._cells.frames))
             if first <= begin and stop <= end and self._there[place]
         }
         middle, total = (first + end - 1) / 2, sum(within.values())
@@ -222,8 +222,8 @@ class _Fitted:
 
     def between_sd(self) -> float:
         """Return the standard deviation of frames from the fitted level, beyond their own errors."""
-        used, frames = self._series.used, np.arange(self._frames)
-        level = np.zeros(self._frames)
+        used, frames = self._series.used, np.arange(self._cells.frames)
+        level = np.zeros(self._cells.frames)
         for each in self.segments():
             part = slice(each.first, each.last + 1)
             if each.begin.value is not None and each.end.value is not None:
