@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Callable
+from functools import partial
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -42,44 +43,35 @@ class Text(click.types.StringParamType):
 
 
 class FilePath(click.Path):
-    """The name of a file or folder; an empty one, which would mean the current folder, is refused."""
+    """The name of a file or folder; an empty one, which would mean the current folder, is refused.
 
-    def __init__(self, metavar: str | None = None) -> None:
+    Parameters
+    ----------
+    metavar : str or None
+        The placeholder in the help.
+    endings : tuple of str
+        Of a file that is written: endings of what is written, lower case, the usual one first. That of a
+        format which is not written there is refused. By default any ending is taken.
+    what : str
+        What is written, in words.
+    """
+
+    def __init__(self, metavar: str | None = None, endings: tuple[str, ...] = (), what: str = "") -> None:
         super().__init__()
-        self.metavar = metavar
+        self.metavar, self.endings, self.what = metavar, endings, what
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if value == "":
             self.fail("the name is empty: is a variable unset?", param, ctx)
+        ending = PurePath(str(value)).suffix.lower()
+        if self.endings and ending in _OTHER_FORMATS.difference(self.endings):
+            self.fail(f"{value!r}: {ending} is not written here; write {self.what}", param, ctx)
         return super().convert(value, param, ctx)
 
 
 # whether they exist, their reader says: in the same words wherever the name came from
 PATH, FILE, DIR, RESULT = FilePath(), FilePath("FILE"), FilePath("DIR"), FilePath("RESULT")
-
-
-class OutputFile(FilePath):
-    """The name of a file to write; the ending of a format that is not written there is refused.
-
-    Parameters
-    ----------
-    endings : tuple of str
-        Endings of what is written, lower case, the usual one first.
-    what : str
-        What is written, in words.
-    """
-
-    def __init__(self, endings: tuple[str, ...], what: str) -> None:
-        super().__init__("FILE")
-        self.endings, self.what = endings, what
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        ending = PurePath(str(value)).suffix.lower()
-        if ending in _OTHER_FORMATS.difference(self.endings):
-            self.fail(f"{value!r}: {ending} is not written here; write {self.what}", param, ctx)
-        return super().convert(value, param, ctx)
-
-
+OutputFile = partial(FilePath, "FILE")
 TABLE_FILE = OutputFile((".csv", ".json"), "CSV (.csv), JSON (.json), or a table to read (any other name)")
 TABLE_FORMATS = ("table", "csv", "json")
 
@@ -107,6 +99,14 @@ class Number(ParamType):
         self.name, self.metavar, self.but = unit, f"{unit}|auto" if auto else unit, but
         self.above, self.at_least, self.at_most = above, at_least, at_most
         self.auto, self.whole = auto, whole
+        bounds = [
+            f"above {above:g}" if above > -math.inf else "",
+            f"other than {but:g}" if but is not None else "",
+            f"of at least {at_least:g}" if at_least > -math.inf else "",
+            f"of at most {at_most:g}" if at_most < math.inf else "",
+        ]
+        words = "a whole number" if whole else "a number", " and ".join(filter(None, bounds))
+        self.what = " ".join(filter(None, [*words, "or auto" if auto else ""]))
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | str:
         if self.auto and value == "auto":
@@ -122,21 +122,8 @@ class Number(ParamType):
             and self.at_least <= number <= self.at_most
         )
         if not fits or isinstance(value, bool) or (self.whole and number != int(number)):
-            self.fail(f"{value!r} is not {self.describe()}", param, ctx)
+            self.fail(f"{value!r} is not {self.what}", param, ctx)
         return int(number) if self.whole else number
-
-    def describe(self) -> str:
-        """Describe in words what is accepted."""
-        words = "a whole number" if self.whole else "a number"
-        bounds = [
-            f"above {self.above:g}" if self.above > -math.inf else "",
-            f"other than {self.but:g}" if self.but is not None else "",
-            f"of at least {self.at_least:g}" if self.at_least > -math.inf else "",
-            f"of at most {self.at_most:g}" if self.at_most < math.inf else "",
-        ]
-        return " ".join(
-            filter(None, [words, " and ".join(filter(None, bounds)), "or auto" if self.auto else ""])
-        )
 
 
 class Parsed(ParamType):
