@@ -9,18 +9,7 @@ from rollcli.cli.command import command, config_option, option, record
 from rollcli.cli.estimate import one_start, resume_command
 from rollcli.cli.types import DIR, FLAG, IMAGE_SIZE, POINT, Choice, Number, span
 from rollcli.run.options import RunningOptions
-from rollcli.simulate.options import (
-    CROSS_SECTIONS,
-    CROSSFALL,
-    FOCAL_PER_WIDTH,
-    GUTTER_WIDTH,
-    KERB,
-    MAX_DIPS,
-    MIXED,
-    ROUGHNESS,
-    SCENES,
-    SimulateOptions,
-)
+from rollcli.simulate.options import CROSS_SECTIONS, MAX_DIPS, MIXED, ROUGHNESS, SCENES, SimulateOptions
 
 simulate_options = record(
     "options",
@@ -33,32 +22,13 @@ simulate_options = record(
     option("--curvature", span(-0.01, 0.01)),
     option("--bend", span(-0.02, 0.02)),
     option("--cross-section", Choice(*CROSS_SECTIONS, MIXED)),
-    option(
-        "--crossfall",
-        span(0, 15),
-        text="Slope of a cross section that is not flat, per cent, drawn evenly from A to B; of a crown or "
-        f"dish at its edges.  [default: {CROSSFALL[0]:g}:{CROSSFALL[1]:g}]",
-    ),
-    option(
-        "--gutter",
-        span(0, 50),
-        text=f"How much more the outer {100 * GUTTER_WIDTH:g} cm on each side fall outward, per cent, drawn "
-        "evenly from A to B.",
-    ),
-    option(
-        "--kerb",
-        span(0, 0.5),
-        text="Height of kerbs and pavements (open, street) above the road's edge, metres, drawn evenly from "
-        f"A to B.  [default: {KERB[0]:g}:{KERB[1]:g}]",
-    ),
+    option("--crossfall", span(0, 15)),
+    option("--gutter", span(0, 50)),
+    option("--kerb", span(0, 0.5)),
     option("--dips", Number("N", at_least=0, at_most=MAX_DIPS, whole=True)),
     option("--roughness", Choice(*ROUGHNESS)),
     option("--size", IMAGE_SIZE),
-    option(
-        "--focal",
-        Number("PX", above=0),
-        text=f"Focal length, pixels.  [default: {FOCAL_PER_WIDTH:g} times the width]",
-    ),
+    option("--focal", Number("PX", above=0)),
     option("--principal-point", POINT),
     option("--principal-offset", span(-16384, 16384)),
     option("--baseline", Number("M", above=0)),

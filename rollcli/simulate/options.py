@@ -87,13 +87,15 @@ class SimulateOptions(Rendering):
         frame one of these. Roll and pitch are against the plane tangent to the road below the left
         camera.
     crossfall : tuple of float or None
-        Lowest and highest slope, per cent; None: `CROSSFALL`. Flat roads have none.
+        Slope of a cross section that is not flat, per cent, drawn evenly from A to B; of a crown or dish at
+        its edges. [default: 1:4]
     gutter : tuple of float
-        Lowest and highest further slope in the gutters, per cent.
+        How much more the outer 35 cm on each side fall outward, per cent, drawn evenly from A to B.
     kerb : tuple of float or None
-        Lowest and highest kerb, metres; None: `KERB`.
+        Height of kerbs and pavements (open, street) above the road's edge, metres, drawn evenly from A to
+        B. [default: 0.1:0.2]
     focal : float or None
-        Pixels; None: `FOCAL_PER_WIDTH` times the width.
+        Focal length, pixels. [default: 0.58 times the width]
     principal_offset : tuple of float
         Offset of the principal point in each direction, pixels, drawn evenly from A to B.
     height : tuple of float
