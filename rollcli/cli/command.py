@@ -173,18 +173,6 @@ def option(names: str, kind: ParamType, *needs: Needs, text: str = "", **attribu
     return click.option(*names.split(", "), cls=Option, help=text, only_with=needs, **attributes)
 
 
-def section(title: str, *declarations: Declaration, only_with: Sequence[Needs] = ()) -> Declaration:
-    """Declare options that stand below one heading of the help, and have the same needs."""
-
-    def declare(function: Callable[..., Any]) -> Callable[..., Any]:
-        for param in _declare(function, declarations):
-            if isinstance(param, Option):
-                param.section, param.only_with = title, (*only_with, *param.only_with)
-        return function
-
-    return declare
-
-
 def record(
     name: str,
     title: str,
@@ -212,10 +200,16 @@ def record(
     fields : class, optional
         Whose fields have defaults and help; by default `make`.
     """
-    options = section(title, *declarations, only_with=only_with)
 
     def declare(function: Callable[..., Any]) -> Callable[..., Any]:
-        field_of = _fill(_declare(function, [options]), fields or make)
+        count = len(getattr(function, "__click_params__", ()))
+        for each in reversed(declarations):
+            each(function)
+        params = getattr(function, "__click_params__", [])[count:]
+        for param in params:
+            if isinstance(param, Option):
+                param.section, param.only_with = title, (*only_with, *param.only_with)
+        field_of = _fill(params, fields or make)
 
         @functools.wraps(function)  # its parameters, too
         def gathered(**values: Any) -> Any:
@@ -257,15 +251,6 @@ def _fill(params: Sequence[click.Parameter], record: Any) -> dict[str, str]:
                 default = param.type.shown(default)
             param.default = default
     return field_of
-
-
-def _declare(function: Callable[..., Any], declarations: Sequence[Declaration]) -> list[click.Parameter]:
-    """Declare parameters before those that the function has; return them, the last one first."""
-    count = len(getattr(function, "__click_params__", ()))
-    for each in reversed(declarations):
-        each(function)
-    declared: list[click.Parameter] = getattr(function, "__click_params__", [])[count:]
-    return declared
 
 
 def command(fields: Any = None, **attributes: Any) -> Callable[[Callable[..., Any]], Command]:

@@ -5,7 +5,7 @@ from typing import Any
 import click
 
 from rollcli.cli import options as shared
-from rollcli.cli.command import command, config_option, option, section
+from rollcli.cli.command import command, config_option, option
 from rollcli.cli.types import DIR, FLAG, RESULT, Choice, Number
 from rollcli.run import options as records
 
@@ -16,19 +16,13 @@ def _run(ctx: click.Context, options: records.ConvertOptions) -> None:
     ctx.exit(run_conversion(options))
 
 
-rotation_options = section(
-    "Angle",
-    option("--roll", Number("DEG", at_least=-180, at_most=180)),
-    option("--from", RESULT),
-    option("--skip-suspect", FLAG),
-    option("--expand", FLAG),
-    option("--save-matrix", FLAG),
-)
-
-
 @command(fields=records.DerotateOptions)
 @shared.input_options
-@rotation_options
+@option("--roll", Number("DEG", at_least=-180, at_most=180), section="Angle")
+@option("--from", RESULT, section="Angle")
+@option("--skip-suspect", FLAG, section="Angle")
+@option("--expand", FLAG, section="Angle")
+@option("--save-matrix", FLAG, section="Angle")
 @shared.output_folder_option
 @shared.encoding_options
 @shared.cluster_options
@@ -87,19 +81,13 @@ def disparity(ctx: click.Context, /, **options: Any) -> None:
     _run(ctx, records.DisparityOptions(**options))
 
 
-count_options = section(
-    "Counting",
-    option("--bins", Number("N", at_least=1, at_most=65535, whole=True)),
-    option("--max-disparity", Number("PX", above=0)),
-    option("--counts", FLAG),
-    option("--figure", click.Choice(["svg", "pdf", "png"])),
-    option("--from", RESULT),
-)
-
-
 @command(fields=records.VDisparityOptions)
 @shared.input_options
-@count_options
+@option("--bins", Number("N", at_least=1, at_most=65535, whole=True), section="Counting")
+@option("--max-disparity", Number("PX", above=0), section="Counting")
+@option("--counts", FLAG, section="Counting")
+@option("--figure", click.Choice(["svg", "pdf", "png"]), section="Counting")
+@option("--from", RESULT, section="Counting")
 @shared.output_folder_option
 @shared.encoding_options
 @shared.calibration_options
