@@ -46,8 +46,8 @@ def draw_disparity(disparity: NDArray[Any]) -> Pixels:
     return cv2.applyColorMap(_levels(disparity), colours).astype(np.uint8, copy=False)
 
 
-def draw_road(disparity: NDArray[Any], mask: NDArray[Any]) -> Pixels:
-    """Draw a map in colour, as `draw_disparity` has it, with the road tinted and outlined.
+def draw_road(disparity: NDArray[Any], mask: NDArray[Any], photo: NDArray[Any] | None = None) -> Pixels:
+    """Draw a map in colour, as `draw_disparity` has it, or a camera image with the road tinted and outlined.
 
     Parameters
     ----------
@@ -55,32 +55,21 @@ def draw_road(disparity: NDArray[Any], mask: NDArray[Any]) -> Pixels:
         Pixels; NaN, inf and <= 0 are no data.
     mask : ndarray, shape (H, W)
         Non-zero where the road is.
+    photo : ndarray, shape (H', W') or (H', W', 3), optional
+        Grey or BGR, uint8 or uint16: drawn in place of the map, at the size of the mask.
 
     Returns
     -------
     ndarray of uint8, shape (H, W, 3)
         BGR.
     """
-    return _with_road(draw_disparity(disparity), mask)
-
-
-def draw_road_on_photo(photo: NDArray[Any], mask: NDArray[Any]) -> Pixels:
-    """Draw a camera image with the road tinted and outlined.
-
-    Parameters
-    ----------
-    photo : ndarray, shape (H, W) or (H, W, 3)
-        Grey or BGR, uint8 or uint16; of any size, it is drawn at the size of the mask.
-    mask : ndarray, shape (H', W')
-        Non-zero where the road is.
-
-    Returns
-    -------
-    ndarray of uint8, shape (H', W', 3)
-        BGR.
-    """
     height, width = np.shape(mask)
-    return _with_road(as_bgr(photo, (width, height)), mask)
+    picture = draw_disparity(disparity) if photo is None else as_bgr(photo, (width, height))
+    road = (np.asarray(mask) != 0).astype(np.uint8)
+    tint = np.arange(256)[:, None] * (1 - _TINT) + np.array(_ROAD) * _TINT
+    cv2.copyTo(cv2.LUT(picture, tint.astype(np.uint8).reshape(256, 1, 3)), road, picture)
+    outlines, _ = cv2.findContours(road, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    return cv2.drawContours(picture, outlines, -1, _ROAD, 1).astype(np.uint8, copy=False)
 
 
 def draw_preview(disparity: NDArray[Any]) -> Pixels:
@@ -138,15 +127,6 @@ def with_bar(picture: Pixels, colours: Pixels, ticks: Iterable[tuple[float, str]
         row = min(max(round((1 - place) * (height - 1)) + 4, 9), height - 4)
         cv2.putText(bar, text, (28, row), _FONT, 0.36, _INK, 1, cv2.LINE_AA)
     return np.hstack([picture, bar])
-
-
-def _with_road(picture: Pixels, mask: NDArray[Any]) -> Pixels:
-    """Tint and outline the road in a picture, BGR."""
-    road = (np.asarray(mask) != 0).astype(np.uint8)
-    tint = np.arange(256)[:, None] * (1 - _TINT) + np.array(_ROAD) * _TINT
-    cv2.copyTo(cv2.LUT(picture, tint.astype(np.uint8).reshape(256, 1, 3)), road, picture)
-    outlines, _ = cv2.findContours(road, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    return cv2.drawContours(picture, outlines, -1, _ROAD, 1).astype(np.uint8, copy=False)
 
 
 def brightest(values: NDArray[Any]) -> float:

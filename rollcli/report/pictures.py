@@ -16,7 +16,7 @@ from rollcli.files.encodings import read_disparity, to_disparity
 from rollcli.files.formats import read_image, read_stored
 from rollcli.pictures.derotate import derotate
 from rollcli.pictures.heights import CAMERA_HEIGHTS, METRES, FittedRoad, heights_over, steadied, unit_of
-from rollcli.pictures.overlay import draw_disparity, draw_heights, draw_road_on_photo
+from rollcli.pictures.overlay import draw_disparity, draw_heights, draw_road
 from rollcli.pictures.vdisparity import draw_v_disparity, row_offset, v_disparity
 from rollcli.report.sources import Subject
 from rollcli.rig.calibration import Calibration, for_matched
@@ -124,7 +124,7 @@ def _road(subject: Subject, source: Source | None) -> NDArray[Any] | None:
     # where options that the record does not give back led to another angle, this is not its road
     if found.road_mask is None or abs(found.theta - subject.theta) > _SAME:
         return None
-    return draw_road_on_photo(source.photo, found.road_mask)
+    return draw_road(source.shown, found.road_mask, source.photo)
 
 
 def _level(subject: Subject, disparity: NDArray[Any] | None) -> NDArray[Any]:

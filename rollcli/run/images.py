@@ -18,7 +18,7 @@ from rollcli.files.formats import Stored, encode_stored
 from rollcli.files.results import Row
 from rollcli.pictures.derotate import derotate, rotation_matrix
 from rollcli.pictures.heights import FittedRoad, heights_over, steadied, unit_of
-from rollcli.pictures.overlay import draw_heights, draw_preview, draw_road, draw_road_on_photo
+from rollcli.pictures.overlay import draw_heights, draw_preview, draw_road
 from rollcli.pictures.vdisparity import draw_v_disparity, middle_row, profile, row_offset, v_disparity
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import horizon_row
@@ -83,11 +83,9 @@ class Pictured:
 
     def road_mask(self, path: str) -> _Named:
         """Draw the road that was found."""
-        source, road = self.source, self.estimate.road_mask
+        road = self.estimate.road_mask
         assert road is not None  # the frame's task asks for it
-        if source.photo is not None:
-            return path, encode_png(draw_road_on_photo(source.photo, road))
-        return path, encode_png(draw_road(source.shown, road))
+        return path, encode_png(draw_road(self.source.shown, road, self.source.photo))
 
     def heights(self, path: str) -> _Named:
         """Measure the heights over the road."""

@@ -18,14 +18,7 @@ from rollcli.files.results import Row
 from rollcli.pictures.colours import style_sheet
 from rollcli.pictures.derotate import derotate, rotation_matrix
 from rollcli.pictures.heights import FittedRoad, heights_over, steadied, unit_of
-from rollcli.pictures.overlay import (
-    draw_disparity,
-    draw_heights,
-    draw_preview,
-    draw_road,
-    draw_road_on_photo,
-    round_step,
-)
+from rollcli.pictures.overlay import draw_disparity, draw_heights, draw_preview, draw_road, round_step
 from rollcli.pictures.vdisparity import (
     VDisparity,
     draw_v_disparity,
@@ -282,8 +275,10 @@ CASES = {
         for height, top in ((40, 60.0), (50, 33.0), (51, 60.0), (120, 0.7), (260, 150.0))
     },
     "road": lambda: _picture(draw_road, _map((60, 80)), _disc()),
-    "road on a photo": lambda: _picture(draw_road_on_photo, _photo(), _disc(hole=False)),
-    "road on a small photo": lambda: _picture(draw_road_on_photo, _photo((60, 80, 3), np.uint8), _disc()),
+    "road on a photo": lambda: _picture(draw_road, _map((60, 80)), _disc(hole=False), _photo()),
+    "road on a small photo": lambda: _picture(
+        draw_road, _map((60, 80)), _disc(), _photo((60, 80, 3), np.uint8)
+    ),
     **{
         f"v-disparity of {height} rows": partial(
             lambda height, horizon: _picture(draw_v_disparity, _histogram(height), CURVE, 5.0, horizon),
