@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from rollcli.report.figures import Drawing
 
 Value = str | int | float | None
-Table = list[dict[str, Value]]  # rows of the same columns
+Line = dict[str, Value]
+Table = list[Line]  # of the same columns
 
 DELTAS_DEG = (0.1, 0.01, 0.001, 0.0001)
 # [GD] Tables I and II
@@ -66,20 +67,16 @@ def maps_table(found: Sequence[Findings], failed: Sequence[tuple[str, str]]) -> 
 
 def iterations_table(found: Sequence[Findings]) -> Table:
     """Return Table I: iterations of both solvers for each delta."""
-    return [
-        {
-            "solver": solver,
-            "delta_deg": DELTAS_DEG[k],
-            "delta_rad": delta,
-            "paper": papers[k],
-            **_spread([getattr(each, solver)[k] for each in found]),
-        }
-        for solver, papers in PAPER_ITERATIONS.items()
-        for k, delta in enumerate(DELTAS)
-    ]
+    table = Table()
+    for solver, papers in PAPER_ITERATIONS.items():
+        for k, delta in enumerate(DELTAS):
+            counts = [getattr(each, solver)[k] for each in found]
+            row: Line = {"solver": solver, "delta_deg": DELTAS_DEG[k], "delta_rad": delta, "paper": papers[k]}
+            table.append({**row, **_spread(counts)})
+    return table
 
 
-def _spread(counts: Sequence[int]) -> dict[str, Value]:
+def _spread(counts: Sequence[int]) -> Line:
     known = (float(np.mean(counts)), min(counts), max(counts)) if counts else (None, None, None)
     return dict(zip(("mean", "min", "max", "maps"), (*known, len(counts)), strict=True))
 
@@ -89,19 +86,13 @@ def runtime_table(times: Sequence[Times]) -> Table:
     table = Table()
     for solver, papers in PAPER_SECONDS.items():
         for k, paper in enumerate(papers):
+            row: Line = {"solver": solver, "delta_deg": DELTAS_DEG[k], "paper_s": paper}
             means = {
-                form: float(np.mean([each.seconds[solver, form][k] for each in times])) for form in FORMS
+                f"{form}_s": float(np.mean([each.seconds[solver, form][k] for each in times]))
+                for form in FORMS
             }
-            table.append(
-                {
-                    "solver": solver,
-                    "delta_deg": DELTAS_DEG[k],
-                    "paper_s": paper,
-                    **{f"{form}_s": mean for form, mean in means.items()},
-                    "textbook_over_moments": means["textbook"] / means["moments"],
-                    "maps": len(times),
-                }
-            )
+            ratio = means["textbook_s"] / means["moments_s"]
+            table.append({**row, **means, "textbook_over_moments": ratio, "maps": len(times)})
     return table
 
 
@@ -121,15 +112,12 @@ def sweep_table(found: Sequence[Findings]) -> Table:
 
 def solvers_table(found: Sequence[Findings]) -> Table:
     """Return Fig. 6: errors of the three solvers after known rotations, for each delta."""
-    return [
-        {
-            "solver": solver,
-            "delta_deg": delta_deg,
-            **_errors([turn[k] for each in found for turn in each.solver_errors[solver]]),
-        }
-        for solver in SOLVERS
-        for k, delta_deg in enumerate(DELTAS_DEG)
-    ]
+    table = Table()
+    for solver in SOLVERS:
+        for k, delta_deg in enumerate(DELTAS_DEG):
+            errors = [turn[k] for each in found for turn in each.solver_errors[solver]]
+            table.append({"solver": solver, "delta_deg": delta_deg, **_errors(errors)})
+    return table
 
 
 def methods_table(found: Sequence[Findings]) -> Table:
@@ -142,7 +130,7 @@ def methods_table(found: Sequence[Findings]) -> Table:
     return table
 
 
-def _errors(errors: Sequence[float]) -> dict[str, Value]:
+def _errors(errors: Sequence[float]) -> Line:
     """Return mean, median, 95th percentile and largest, degrees; then how many there are."""
     names = ("mean_deg", "median_deg", "p95_deg", "worst_deg")
     if not errors:
