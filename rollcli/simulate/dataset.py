@@ -84,17 +84,14 @@ def lane_rolls_of(spec: FrameSpec) -> tuple[float, float]:
 
     Of a flat and smooth road both are `FrameSpec.roll`.
     """
-    carriageway, lane = carriageway_of(spec), lane_points()
-    lane = lane._replace(
-        weight=lane.weight * ((lane.lateral > carriageway.left) & (lane.lateral < carriageway.right))
-    )
-    height = carriageway.section.elevation(lane.lateral)
+    carriageway, (lateral, z, weight) = carriageway_of(spec), lane_points()
+    height = carriageway.section.elevation(lateral)
     if carriageway.relief is not None:
-        height = height + carriageway.relief.height(lane.lateral, lane.z)
-    course, camera = carriageway.course, spec.cameras(carriageway.normal)[0]
-    right = lane.lateral + lane.z * (course.heading + course.bend / 2 * lane.z)
-    points = np.array([right, height + course.curvature / 2 * lane.z**2, lane.z])
-    return lane_rolls(camera.axes @ (points - camera.position[:, None]), lane)
+        height = height + carriageway.relief.height(lateral, z)
+    camera = spec.cameras(carriageway.normal)[0]
+    points = carriageway.course.point(lateral, z, height) - camera.position[:, None]
+    on_road = (lateral > carriageway.left) & (lateral < carriageway.right)
+    return lane_rolls(camera.axes @ points, lateral, z, weight * on_road)
 
 
 def calibration(spec: FrameSpec) -> bytes:

@@ -10,7 +10,6 @@ G(n0) (n / n0)^-2 over the waves' number per metre n, G(n0) four times as large 
 import itertools
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,24 +145,16 @@ class Relief:
 LEVEL = Relief(np.zeros((2, 2)), 0.0, 0.0, 1.0)
 
 
-class LanePoints(NamedTuple):
-    """Points (N,) on the lane: lateral position and Z, metres, and how many points of a lidar each is.
+def lane_points() -> tuple[Array, Array, Array]:
+    """Return points (N,) all over the lane: lateral position and Z, metres, and how many of a lidar each is.
 
     A lidar's points are as dense as an image's pixels: their number falls with the third power of Z.
     """
-
-    lateral: Array
-    z: Array
-    weight: Array
-
-
-def lane_points() -> LanePoints:
-    """Return points all over the widest and longest part."""
     widest, farthest = HALF_WIDTHS[-1], FAR_ENDS[-1]
     across = np.arange(-widest + _LANE_STEP / 2, widest, _LANE_STEP)
     ahead = 1 / np.linspace(1 / NEAR_END, 1 / farthest, _LANE_ROWS)
     lateral, z = (grid.ravel() for grid in np.meshgrid(across, ahead))
-    return LanePoints(lateral, z, 1 / z)
+    return lateral, z, 1 / z
 
 
 def lane_plane(relief: Relief) -> tuple[float, float, float]:
@@ -178,15 +169,15 @@ def lane_plane(relief: Relief) -> tuple[float, float, float]:
     return level, right, ahead
 
 
-def lane_rolls(points: Array, lane: LanePoints) -> tuple[float, float]:
+def lane_rolls(points: Array, lateral: Array, ahead: Array, weight: Array) -> tuple[float, float]:
     """Return the least and the greatest roll of the lane, radians, by the parts and with and without camber.
 
     Parameters
     ----------
     points : numpy.ndarray
         (3, N); the lane's points, right, down and forward of the camera, metres.
-    lane : LanePoints
-        Where on the road they are.
+    lateral, ahead, weight : numpy.ndarray
+        Where on the road they are, as `lane_points` has it.
 
     Notes
     -----
@@ -197,8 +188,8 @@ def lane_rolls(points: Array, lane: LanePoints) -> tuple[float, float]:
     rows = np.array([np.ones_like(x), x, z, z * z, x * x])
     rolls = []
     for width, far, terms in itertools.product(HALF_WIDTHS, FAR_ENDS, (4, 5)):
-        used = (np.abs(lane.lateral) < width) & (lane.z < far)
-        rolls.append(math.atan(_fit(rows[:terms], y, lane.weight * used)[1]))
+        used = (np.abs(lateral) < width) & (ahead < far)
+        rolls.append(math.atan(_fit(rows[:terms], y, weight * used)[1]))
     return min(rolls), max(rolls)
 
 

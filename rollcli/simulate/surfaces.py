@@ -8,7 +8,7 @@ is followed in steps.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,8 +77,8 @@ class Course:
         _, y, z = points
         return np.asarray(y - self.curvature / 2 * z * z)
 
-    def point(self, lateral: float, z: float, elevation: float = 0.0) -> Array:
-        """Return the world point (3,) of road coordinates."""
+    def point(self, lateral: Any, z: Any, elevation: Any = 0.0) -> Array:
+        """Return the world point (3,) of road coordinates, or points (3, N) of arrays of them."""
         x = lateral + z * (self.heading + self.bend / 2 * z)
         return np.array([x, elevation + self.curvature / 2 * z * z, z])
 
