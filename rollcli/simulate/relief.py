@@ -50,11 +50,6 @@ class Dip:
     along: float
     height: float
 
-    @property
-    def box(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Its middle, lateral and Z, and how far it reaches from there, metres."""
-        return (self.lateral, self.z), (_AROUND * self.across, _AROUND * self.along)
-
     def relief(self, lateral: Vectors, z: Vectors) -> tuple[Vectors, Vectors, Vectors]:
         """Return height over the road, metres, and its slopes by lateral and by z."""
         x, y = (lateral - self.lateral) / self.across, (z - self.z) / self.along
@@ -91,21 +86,18 @@ class Relief:
     dips: tuple[Dip, ...] = ()
 
     @property
-    def lowest(self) -> float:
-        """The lowest height, metres."""
-        return float(self.heights.min()) + min([0.0, *(dip.height for dip in self.dips)])
-
-    @property
-    def highest(self) -> float:
-        """The greatest height, metres."""
-        return float(self.heights.max()) + max([0.0, *(dip.height for dip in self.dips)])
+    def span(self) -> tuple[float, float]:
+        """The lowest and the greatest height, metres."""
+        dips = [0.0, *(dip.height for dip in self.dips)]
+        return float(self.heights.min()) + min(dips), float(self.heights.max()) + max(dips)
 
     def is_between(self, first: tuple[Array, Array], last: tuple[Array, Array]) -> NDArray[np.bool_]:
         """Tell where it may be uneven between two positions (lateral and Z, each (N,)), metres."""
         found = np.full(first[0].shape, bool(self.heights.any()))
         for dip in self.dips:
             near = np.ones(found.shape, bool)
-            for one, other, middle, radius in zip(first, last, *dip.box, strict=True):
+            places = ((dip.lateral, _AROUND * dip.across), (dip.z, _AROUND * dip.along))
+            for one, other, (middle, radius) in zip(first, last, places, strict=True):
                 near &= (np.fmax(one, other) > middle - radius) & (np.fmin(one, other) < middle + radius)
             found |= near
         return found

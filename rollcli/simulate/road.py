@@ -382,7 +382,7 @@ class Site:
         if beyond is not None:
             ends.append(side * np.inf)
             materials.append(beyond)
-        foot = base + (self.road.relief.lowest if self.road.relief else 0.0)
+        foot = base + (self.road.relief.span[0] if self.road.relief else 0.0)
         kerb = Wall(self.road.course, edge, foot, np.array([-50.0, FAR]), np.array([level]), stone)
         edges, course, relief = tuple(ends[::side]), self.road.course, self.road.relief
         strips = Ground(course, edges, tuple(materials[::side]), FAR, offset=level, relief=relief)

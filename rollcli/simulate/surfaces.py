@@ -126,7 +126,7 @@ class Ground(Surface):
             return self._first_smooth_hit(origin, direction)
         first, last = (
             replace(self, offset=self.offset + raised)._first_smooth_hit(origin, direction)
-            for raised in (self.relief.highest, self.relief.lowest)
+            for raised in reversed(self.relief.span)
         )
         last = np.fmax(first, last)
         ends = [origin + t * direction for t in (first, last)]

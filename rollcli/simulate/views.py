@@ -53,13 +53,6 @@ class Camera:
         v, u = np.indices((len(rows), self.width), float).reshape(2, -1)
         return self.rays(u, v + rows.start)
 
-    def project(self, points: Array) -> tuple[Array, Array, Array]:
-        """Return columns, rows (pixels) and depths (metres) of world points (3, N); depths have a sign."""
-        x, y, depth = self.axes @ (points - self.position[:, None])
-        u = self.focal * x / depth + self.centre[0]
-        v = self.focal * y / depth + self.centre[1]
-        return u, v, depth
-
 
 def rig_axes(roll: float, pitch: float, normal: Array) -> Array:
     """Return the right, down and forward axes of a rig in the world, as the rows of a (3, 3) array.
@@ -126,11 +119,13 @@ class Rays:
         """Return the indices of rays that can hit a box with these corners (3, 8); None: all of them can."""
         if corners is None:
             return None
-        u, v, depth = self.camera.project(corners)
+        camera = self.camera
+        x, y, depth = camera.axes @ (corners - camera.position[:, None])
         if depth.max() <= 0:
             return np.empty(0, np.intp)
         if depth.min() <= 0.1:
             return None
+        u, v = camera.focal * x / depth + camera.centre[0], camera.focal * y / depth + camera.centre[1]
         across = (self.u >= u.min()) & (self.u <= u.max())
         return np.flatnonzero(across & (self.v >= v.min()) & (self.v <= v.max()))
 
