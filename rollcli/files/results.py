@@ -55,8 +55,10 @@ def encode_parquet(
 
     columns = [(name, _ARROW_TYPES[kind]) for name, kind in types.items()]
     schema = pyarrow.schema(columns, metadata={_RECORD: json.dumps(record).encode()})
-    require_utf8(text for row in rows for text in row.values() if isinstance(text, str))
-    table = pyarrow.Table.from_pylist(list(rows), schema=schema)
+    try:
+        table = pyarrow.Table.from_pylist(list(rows), schema=schema)
+    except UnicodeEncodeError as error:
+        raise _not_utf8(error) from error
     target = io.BytesIO()
     pyarrow.parquet.write_table(table, target, compression="zstd", version="2.6", write_page_checksum=True)
     return target.getvalue()
@@ -74,8 +76,12 @@ def require_utf8(texts: Iterable[str]) -> None:
         for text in texts:
             text.encode()
     except UnicodeEncodeError as error:
-        name = error.object.encode("utf-8", "backslashreplace").decode()
-        raise UsageError(f"{name}: this name is not UTF-8, which Parquet cannot hold; use CSV") from error
+        raise _not_utf8(error) from error
+
+
+def _not_utf8(error: UnicodeEncodeError) -> UsageError:
+    name = error.object.encode("utf-8", "backslashreplace").decode()
+    return UsageError(f"{name}: this name is not UTF-8, which Parquet cannot hold; use CSV")
 
 
 def decode_parquet(data: bytes, name: str) -> Iterator[tuple[int, dict[str, Any]]]:
