@@ -147,14 +147,14 @@ class ColumnSupport:
     twist: float
     pitch: float
     error: float
-    pitch_error: float = 0.0
+    pitch_error: float
 
     def resized(self, factor: float) -> "ColumnSupport":
         """Return the same of views `factor` times as large."""
         return replace(self, twist=self.twist / factor, pitch=self.pitch / factor)
 
 
-NOTHING_KNOWN = ColumnSupport(0.0, 0.0, 0.0, 0.0)
+NOTHING_KNOWN = ColumnSupport(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def advice_of(lower: float, clockwise: float, larger: float, twist: float) -> str:

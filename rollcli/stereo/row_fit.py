@@ -314,8 +314,8 @@ def column_support(seen: ColumnEvidence) -> ColumnSupport:
     error = lens / (x * y) ** 2 + seen.twist_variance
     twist, twist_error = _yaw_of_twist(seen.twist, error, yaw, skew, ratio)
     parts = scale[1], 2 * twist_error * height * _ROAD_ACROSS, pitch[1] * height * _ROAD_DOWN
-    left = float(np.linalg.norm(parts)), parts[2]
-    return ColumnSupport(scale[0], twist, pitch[0], *left).resized(seen.factor)
+    open_slope = float(np.linalg.norm(parts))
+    return ColumnSupport(scale[0], twist, pitch[0], open_slope, parts[2]).resized(seen.factor)
 
 
 def _yaw_of_twist(twist: float, error: float, yaw: float, skew: float, ratio: float) -> tuple[float, float]:
