@@ -3,6 +3,7 @@
 import math
 
 import cv2
+import numpy as np
 
 from rollcli.estimator.road.find import road_plane
 
@@ -17,6 +18,17 @@ def seen_by(view, *, clockwise_deg=0.0, larger_percent=0.0, lower=0.0, border=cv
     matrix = cv2.getRotationMatrix2D(centre, -clockwise_deg, 1 + larger_percent / 100)
     matrix[1, 2] += lower
     return cv2.warpAffine(view, matrix, (width, height), flags=cv2.INTER_LANCZOS4, borderMode=border)
+
+
+def seen_turned(view, yaw_deg=0.0, pitch_deg=0.0, focal=0.7):
+    """What a camera sees that is turned to the side or down, of a focal length of so many widths."""
+    height, width = view.shape[:2]
+    focal *= width
+    camera = np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1]])
+    turned, _ = cv2.Rodrigues(np.radians([pitch_deg, yaw_deg, 0.0]))
+    seen = camera @ turned @ np.linalg.inv(camera)
+    how = {"flags": cv2.INTER_LANCZOS4, "borderMode": cv2.BORDER_REFLECT}
+    return cv2.warpPerspective(view, seen, (width, height), **how)
 
 
 def find_road(small):

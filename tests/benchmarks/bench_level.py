@@ -32,6 +32,7 @@ from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import draw_specs
 from rollcli.stereo.match import StereoMatch
 from rollcli.stereo.misalignment import LEVEL
+from tests.odd_views import seen_turned
 
 STREETS = Path(__file__).parents[3] / "shared" / "streets"
 SEED = 812
@@ -136,17 +137,6 @@ def warped(view: NDArray[Any], clockwise_deg: float, larger: float, lower: float
     matrix[1, 2] += lower
     size = width, height
     return cv2.warpAffine(view, matrix, size, flags=cv2.INTER_LANCZOS4, borderMode=cv2.BORDER_REFLECT)
-
-
-def seen_turned(view: NDArray[Any], yaw_deg: float = 0.0, pitch_deg: float = 0.0) -> NDArray[Any]:
-    """What a camera sees that is turned to the side or down, of a focal length of 0.7 widths."""
-    height, width = view.shape[:2]
-    focal = 0.7 * width
-    camera = np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1]])
-    turned, _ = cv2.Rodrigues(np.radians([pitch_deg, yaw_deg, 0.0]))
-    seen = camera @ turned @ np.linalg.inv(camera)
-    how = {"flags": cv2.INTER_LANCZOS4, "borderMode": cv2.BORDER_REFLECT}
-    return cv2.warpPerspective(view, seen, (width, height), **how)
 
 
 def bent(view: NDArray[Any], share: float) -> NDArray[Any]:

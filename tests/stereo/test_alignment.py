@@ -20,7 +20,8 @@ from rollcli.stereo.alignment import Approach, level
 from rollcli.stereo.match import StereoOptions, match_pair
 from rollcli.stereo.misalignment import LEVEL, Misalignment
 from rollcli.stereo.views import resampled
-from tests.odd_views import seen_by
+from tests.odd_views import seen_by, seen_turned
+from tests.real_pairs import needs_lidar, real_pairs
 from tests.slow import mostly_slow
 
 SHARED = Path(__file__).parents[2].parent / "shared"
@@ -242,40 +243,30 @@ def test_a_drive_that_does_not_tell_a_pitch_leaves_its_pairs_in_doubt(frame, tmp
     assert match.slope_error == 0.0006
 
 
-def pitched(view, pitch_deg):
-    """The view of a camera that is pitched; the angle of its rays, not the program's formulas."""
-    height, width = view.shape
-    camera = np.array([[0.6 * width, 0, (width - 1) / 2], [0, 0.6 * width, (height - 1) / 2], [0, 0, 1]])
-    turn, _ = cv2.Rodrigues(np.radians([pitch_deg, 0.0, 0.0]))
-    seen = camera @ turn @ np.linalg.inv(camera)
-    return cv2.warpPerspective(
-        view, seen, (width, height), flags=cv2.INTER_LANCZOS4, borderMode=cv2.BORDER_REFLECT
-    )
-
-
-def moved_by_a_pitch(left, right, pitch_deg):
+def moved_by_a_pitch(left, right, pitch_deg, level_deg):
     """How far a pitch of the right camera moves the angle, degrees; 0 where the pair is in doubt."""
-    match = match_pair(left, pitched(right, pitch_deg), StereoOptions())
+    match = match_pair(left, seen_turned(right, pitch_deg=pitch_deg, focal=0.6), StereoOptions())
     found = math.degrees(estimate_roll(match.disparity).theta)
-    return 0.0 if match.doubt else abs(found - roll_deg(left, right))
+    return 0.0 if match.doubt else abs(found - level_deg)
 
 
 @pytest.mark.parametrize("pitch_deg", [-0.3, 0.1, 0.3])
 def test_a_pitch_of_the_right_camera_is_levelled_or_doubted(frame, pitch_deg):
-    assert moved_by_a_pitch(frame.left, frame.right, pitch_deg) < 0.05
+    level_deg = roll_deg(frame.left, frame.right)
+    assert moved_by_a_pitch(frame.left, frame.right, pitch_deg, level_deg) < 0.05
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not (SHARED / "lidar").is_dir(), reason="no real pairs with lidar at ../shared/lidar")
+@needs_lidar
 def test_a_pitch_of_a_real_right_camera_is_levelled_or_doubted():
     """What a road and a lens have of their own looks like a pitch, too: one in ten may go wrong."""
-    named = sorted((SHARED / "lidar" / "left").iterdir())[1::5]
-    pairs = [
-        (read_image(str(left)), read_image(str(left.parents[1] / "right" / left.name))) for left in named
-    ]
-    moved = [moved_by_a_pitch(*pair, pitch_deg) for pair in pairs for pitch_deg in (-0.3, 0.3)]
+    moved = []
+    for pair in real_pairs(slice(1, None, 5)):
+        match = match_pair(*pair, StereoOptions())
+        assert match.doubt == ""
+        level_deg = math.degrees(estimate_roll(match.disparity).theta)
+        moved += [moved_by_a_pitch(*pair, pitch_deg, level_deg) for pitch_deg in (-0.3, 0.3)]
     assert np.mean(np.array(moved) < 0.1) >= 0.9
-    assert sum(match_pair(*pair, StereoOptions()).doubt != "" for pair in pairs) == 0
 
 
 def test_align_off_measures_nothing(frame):

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -10,17 +9,15 @@ import pytest
 
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.request import Request
-from rollcli.files.formats import read_image
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
 from rollcli.stereo import match as matching
 from rollcli.stereo.match import StereoOptions, Wanted, compute_disparity, match_pair
 from tests.odd_views import find_road, seen_by
+from tests.real_pairs import LIDAR, needs_lidar, real_pairs
 from tests.true_disparity import true_disparity
 
-LIDAR = Path(__file__).parents[2].parent / "shared" / "lidar"
-needs_lidar = pytest.mark.skipif(not LIDAR.is_dir(), reason="no real pairs with lidar at ../shared/lidar")
 SPEC = FrameSpec(scene="street", roll=math.radians(4), size=(640, 480), seed=3)
 
 
@@ -80,11 +77,6 @@ def test_rendered_roads_get_the_angle_of_the_whole_match():
     asked = SimulateOptions(frames=6, size=(640, 480), seed=17, grey=True)
     frames = [render_frame(spec) for spec in draw_specs(asked)]
     assert_agree([(frame.left, frame.right) for frame in frames])
-
-
-def real_pairs(which):
-    named = sorted((LIDAR / "left").iterdir())[which]
-    return [(read_image(str(left)), read_image(str(LIDAR / "right" / left.name))) for left in named]
 
 
 @pytest.mark.slow
