@@ -12,7 +12,7 @@ from rollcli.files.formats import read_image
 from rollcli.simulate import dataset as module
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.dataset import plan_dataset, write_dataset
-from rollcli.simulate.options import SCENES, SimulateOptions
+from rollcli.simulate.options import CROSSFALL, FOCAL_PER_WIDTH, GUTTER_WIDTH, KERB, SCENES, SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
 from tests.make_sample_data import EXACT, SAMPLES, SPECS, make
 from tests.run_cli import contents, rows_of
@@ -124,6 +124,13 @@ def test_the_right_camera_is_above_the_road_just_when_the_baseline_leaves_room(p
     FrameSpec(roll=math.radians(40), pitch=pitch, height=1e-6)
     with pytest.raises(UsageError, match="right camera is under the road"):
         FrameSpec(roll=-math.radians(40), pitch=pitch, height=lowest - 1e-6)
+
+
+def test_the_help_has_the_numbers_that_are_used():
+    ranges = [f"[default: {low:g}:{high:g}]" for low, high in (CROSSFALL, KERB)]
+    said = " ".join(str(SimulateOptions.__doc__).split())
+    for each in (*ranges, f"{FOCAL_PER_WIDTH:g} times the width", f"outer {100 * GUTTER_WIDTH:g} cm"):
+        assert each in said
 
 
 def test_without_ranges_the_documented_ones_are_drawn():
