@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from rollcli.estimator.doubts import doubts_of
 from rollcli.estimator.interval import Tangent, interval_of, jackknife, touch
 from rollcli.estimator.moments import CheckedMap, Grid
-from rollcli.estimator.request import AREAS, DEFAULT_REQUEST, Request
+from rollcli.estimator.request import AREAS, DEFAULT_REQUEST, SOLVERS, Request
 from rollcli.estimator.road.model import Parabola
-from rollcli.estimator.road.pixels import PixelSet, load_solver, select_pixels
+from rollcli.estimator.road.pixels import PixelSet, select_pixels
 from rollcli.estimator.solvers.exact import CertifiedSolution, certify
 
 
@@ -226,6 +226,6 @@ def _solve(pixels: PixelSet, request: Request) -> CertifiedSolution:
     """Find the angle, unless the method that chose the pixels did, and compare it with all minima."""
     if pixels.solution is not None:
         return certify(pixels.energy, pixels.solution)
-    solution = load_solver(request.method)(pixels.energy, request.solver)
+    solution = SOLVERS[request.method].load()(pixels.energy, request)
     road_theta = pixels.surface.model.theta if pixels.road and pixels.surface else None
     return certify(pixels.energy, solution, road_theta, request.tolerance)

@@ -9,7 +9,8 @@ Add a method that chooses pixels: an `AreaMethod` in ``solvers/areas.py``, and o
 import math
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from importlib import import_module
+from typing import Any, Literal, NamedTuple
 
 from rollcli.errors import UsageError
 from rollcli.estimator.tuning import TUNING, Tuning
@@ -29,6 +30,11 @@ class Method(NamedTuple):
     function: str
     summary: str
 
+    def load(self) -> Any:
+        """Return its function, a `Solver` or an `AreaMethod`."""
+        module, function = self.function.split(".")
+        return getattr(import_module(f"rollcli.estimator.solvers.{module}"), function)
+
 
 SOLVERS = {
     "gd": Method("gradient_descent.gradient_descent", "gradient descent"),
@@ -42,40 +48,6 @@ AREAS = {
 METHODS = {**SOLVERS, **AREAS}
 MODELS = ("parabola", "line")
 ROADS = ("auto", "all")
-
-
-class SolverSettings(NamedTuple):
-    """The settings of solvers.
-
-    Attributes
-    ----------
-    tolerance : float
-        delta_theta of the paper, radians; more than 0.
-    lambda0 : float or "auto"
-        First learning rate of gradient descent, rad^2 per unit of the normalised energy.
-    """
-
-    tolerance: float = math.radians(TOLERANCE_DEG)
-    lambda0: LearningRate = LAMBDA0
-
-
-class AreaSettings(NamedTuple):
-    """The settings of methods that choose pixels.
-
-    Attributes
-    ----------
-    max_roll : float
-        The largest abs(roll) of a plane that may be road, radians.
-    chosen : bool
-        Whether the usable pixels are the chosen area already.
-    """
-
-    max_roll: float = math.radians(MAX_ROLL_DEG)
-    chosen: bool = False
-
-
-DEFAULT_SOLVER = SolverSettings()
-DEFAULT_AREA = AreaSettings()
 
 
 @dataclass(frozen=True)
@@ -93,9 +65,9 @@ class Request:
     lambda0 : float or "auto"
         First learning rate of gradient descent, rad^2 per unit of the normalised energy.
     tolerance : float
-        delta_theta of the paper, radians.
+        delta_theta of the paper, radians; more than 0.
     max_roll : float
-        The largest abs(roll) that road finding considers, radians.
+        The largest abs(roll) that road finding considers, and of a plane that may be road, radians.
     max_interval : float
         Half-width of the 95 % interval above which an angle is doubted, radians; so is one of which noise
         and unevenness make more than 0.45 times that.
@@ -119,9 +91,9 @@ class Request:
     method: str = "gd"
     model: str = "parabola"
     road: str = "auto"
-    lambda0: LearningRate = DEFAULT_SOLVER.lambda0
-    tolerance: float = DEFAULT_SOLVER.tolerance
-    max_roll: float = DEFAULT_AREA.max_roll
+    lambda0: LearningRate = LAMBDA0
+    tolerance: float = math.radians(TOLERANCE_DEG)
+    max_roll: float = math.radians(MAX_ROLL_DEG)
     max_interval: float = math.radians(MAX_INTERVAL_DEG)
     slope_error: float = 0.0
     seed: int = 0
@@ -152,11 +124,6 @@ class Request:
             raise UsageError(
                 f"a widest interval of {math.degrees(self.max_interval):g} degrees: give a positive angle"
             )
-
-    @property
-    def solver(self) -> SolverSettings:
-        """The settings of a solver."""
-        return SolverSettings(self.tolerance, self.lambda0)
 
     @property
     def parabolic(self) -> bool:

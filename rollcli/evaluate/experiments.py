@@ -14,8 +14,7 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.moments import CheckedMap, Floats, Grid, map_moments
-from rollcli.estimator.request import LAMBDA0, MAX_ROLL_LIMIT_DEG, AreaSettings, Request, SolverSettings
-from rollcli.estimator.road.pixels import load_area_method, load_solver
+from rollcli.estimator.request import AREAS, LAMBDA0, MAX_ROLL_LIMIT_DEG, SOLVERS, Request
 from rollcli.estimator.solvers.areas import fit_plane
 from rollcli.estimator.solvers.exact import exact, minima
 from rollcli.estimator.solvers.golden_section import golden_section, shrink_bracket
@@ -60,7 +59,6 @@ def rotate_nearest(disparity: NDArray[Any], angle: float) -> NDArray[Any]:
 
 DELTAS = tuple(math.pi / k for k in (1.8e3, 1.8e4, 1.8e5, 1.8e6))
 LAMBDAS = tuple(float(rate) for rate in range(1, 101))
-SOLVERS = ("gd", "gss", "exact")
 METHODS = ("gd", "line", "plane", "areas", "auto")
 _LARGEST_ROLL = math.radians(MAX_ROLL_LIMIT_DEG)
 
@@ -148,7 +146,7 @@ def examine(
     def solver_errors(solve: Solver) -> tuple[tuple[float, ...], ...]:
         base = theta if truth is None else truth
         return tuple(
-            tuple(angle_between(solve(each, SolverSettings(delta)).theta, base + turn) for delta in DELTAS)
+            tuple(angle_between(solve(each, Request(tolerance=delta)).theta, base + turn) for delta in DELTAS)
             for each, turn in zip(energies, turns, strict=True)
         )
 
@@ -159,10 +157,10 @@ def examine(
         height=height,
         pixels=round(energy.weight),
         theta=theta,
-        gss=tuple(golden_section(energy, SolverSettings(delta)).iterations for delta in DELTAS),
-        gd=tuple(gradient_descent(energy, SolverSettings(delta)).iterations for delta in DELTAS),
+        gss=tuple(golden_section(energy, Request(tolerance=delta)).iterations for delta in DELTAS),
+        gd=tuple(gradient_descent(energy, Request(tolerance=delta)).iterations for delta in DELTAS),
         sweep=_sweep(energy),
-        solver_errors={name: solver_errors(load_solver(name)) for name in SOLVERS},
+        solver_errors={name: solver_errors(each.load()) for name, each in SOLVERS.items()},
         method_errors={name: method_errors(method) for name, method in methods.items()},
     )
 
@@ -175,7 +173,7 @@ def _sweep(energy: Energy) -> tuple[tuple[int | None, ...], ...]:
     ends = [minimum.theta for minimum in minima(energy)]
 
     def iterations(delta: float, rate: float) -> int | None:
-        found = gradient_descent(energy, SolverSettings(delta, rate))
+        found = gradient_descent(energy, Request(tolerance=delta, lambda0=rate))
         return found.iterations if min(angle_between(found.theta, end) for end in ends) <= delta else None
 
     return tuple(tuple(iterations(delta, rate) for rate in LAMBDAS) for delta in DELTAS)
@@ -183,20 +181,20 @@ def _sweep(energy: Energy) -> tuple[tuple[int | None, ...], ...]:
 
 def _methods(largest_turn: float, chosen: bool) -> dict[str, Callable[[NDArray[Any]], float]]:
     """Return each method as a function from a map to its angle."""
-    max_roll = min(_LARGEST_ROLL, Request.max_roll + max(0.0, largest_turn - math.radians(20)))
-    settings = AreaSettings(max_roll, chosen=chosen)
+    further = max(0.0, largest_turn - math.radians(20))
+    request = Request(max_roll=min(_LARGEST_ROLL, Request.max_roll + further))
 
     def by_areas(name: str, disparity: NDArray[Any]) -> float:
         checked = CheckedMap.of(disparity, None)
-        pixels = load_area_method(name)(checked.values, checked.valid, settings)
+        pixels = AREAS[name].load()(checked.values, checked.valid, request, chosen)
         return fit_plane(checked.values, pixels).solution.theta
 
     return {
-        "gd": lambda disparity: gradient_descent(_energy(disparity), SolverSettings(DELTAS[-1])).theta,
+        "gd": lambda disparity: gradient_descent(_energy(disparity), Request(tolerance=DELTAS[-1])).theta,
         "line": lambda disparity: exact(_energy(disparity, parabolic=False)).theta,
         "plane": partial(by_areas, "plane"),
         "areas": partial(by_areas, "areas"),
-        "auto": lambda disparity: estimate_roll(disparity, Request(max_roll=max_roll)).theta,
+        "auto": lambda disparity: estimate_roll(disparity, request).theta,
     }
 
 
@@ -301,10 +299,10 @@ def time_solvers(disparity: NDArray[Any]) -> Times:
         return tuple(_best(partial(solve, delta), times) for delta in DELTAS)
 
     def alone(solve: Solver, delta: float) -> Solution:
-        return solve(energy, SolverSettings(delta))
+        return solve(energy, Request(tolerance=delta))
 
     def with_pass(solve: Solver, delta: float) -> Solution:
-        return solve(Energy.of(map_moments(disparity), peak), SolverSettings(delta))
+        return solve(Energy.of(map_moments(disparity), peak), Request(tolerance=delta))
 
     seconds: dict[tuple[str, str], tuple[float, ...]] = {}
     descend: Callable[[float], Solution] = partial(textbook.gradient_descent, lambda0=LAMBDA0)

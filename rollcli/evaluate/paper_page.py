@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rollcli import __version__
-from rollcli.evaluate.experiments import DELTAS, FORMS, LAMBDAS, METHODS, SOLVERS, Findings, Times
+from rollcli.estimator.request import SOLVERS
+from rollcli.evaluate.experiments import DELTAS, FORMS, LAMBDAS, METHODS, Findings, Times
 from rollcli.evaluate.options import PaperOptions
 from rollcli.files.results import csv_table
 from rollcli.report.page import render_page

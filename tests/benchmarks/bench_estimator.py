@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.moments import map_moments
-from rollcli.estimator.request import LAMBDA0, SolverSettings
+from rollcli.estimator.request import DEFAULT_REQUEST, LAMBDA0
 from rollcli.estimator.solvers.areas import iterative
 from rollcli.estimator.solvers.exact import exact
 from rollcli.estimator.solvers.golden_section import golden_section
@@ -27,7 +27,6 @@ from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.evaluate.experiments import Textbook
 
 SIZES = ((640, 480), (1242, 375), (1920, 1080), (1730, 1028))
-SETTINGS = SolverSettings()
 
 
 def road(width: int, height: int) -> np.ndarray:
@@ -56,13 +55,13 @@ def measure(width: int, height: int) -> dict[str, float]:
         "moments of the map": best(lambda: map_moments(disparity)),
         "E, gradient and curvature": best(lambda: energy.at(0.1)),
         "exact": best(lambda: exact(energy)),
-        "gd": best(lambda: gradient_descent(energy, SETTINGS)),
-        "gss": best(lambda: golden_section(energy, SETTINGS)),
+        "gd": best(lambda: gradient_descent(energy)),
+        "gss": best(lambda: golden_section(energy)),
         "areas, with its pass": best(lambda: iterative(disparity, disparity > 0)),
         "n x 3: E": best(lambda: textbook.energy(0.1)),
         "n x 3: gradient": best(lambda: textbook.gradient(0.1)),
-        "n x 3: gd": best(lambda: textbook.gradient_descent(SETTINGS.tolerance, LAMBDA0)),
-        "n x 3: gss": best(lambda: textbook.golden_section(SETTINGS.tolerance)),
+        "n x 3: gd": best(lambda: textbook.gradient_descent(DEFAULT_REQUEST.tolerance, LAMBDA0)),
+        "n x 3: gss": best(lambda: textbook.golden_section(DEFAULT_REQUEST.tolerance)),
     }
     figures["moments / np.sum"] = figures["moments of the map"] / figures["np.sum of the map"]
     figures["n x 3 gradient / E, gradient and curvature"] = (

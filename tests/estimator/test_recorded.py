@@ -8,9 +8,9 @@ import numpy as np
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.moments import CheckedMap
-from rollcli.estimator.request import MAX_ROLL_DEG, AreaSettings, Request, SolverSettings
+from rollcli.estimator.request import AREAS, LAMBDA0, MAX_ROLL_DEG, Request
 from rollcli.estimator.road.find import road_plane
-from rollcli.estimator.road.pixels import load_area_method, select_pixels
+from rollcli.estimator.road.pixels import select_pixels
 from rollcli.estimator.solvers.exact import minima
 from rollcli.estimator.solvers.golden_section import golden_section
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
@@ -167,16 +167,19 @@ def _behind(name):
 def _solved(name):
     disparity = MAPS[name]()
     energy = energy_of(disparity)
-    settings = [SolverSettings(1e-3), SolverSettings(1e-5, 2.0), SolverSettings(1e-4, "auto")]
+    settings = [
+        Request(tolerance=tolerance, lambda0=rate)
+        for tolerance, rate in ((1e-3, LAMBDA0), (1e-5, 2.0), (1e-4, "auto"))
+    ]
     return {
         "minima": minima(energy),
         "descent": [gradient_descent(energy, each) for each in settings],
         "section": [golden_section(energy, each) for each in settings],
         "parabola": [energy.parabola(theta) for theta in (-1.2, 0.0, 0.3)],
         "areas": [
-            load_area_method(method)(disparity, disparity > 0, area)
+            AREAS[method].load()(disparity, disparity > 0, *area)
             for method in ("plane", "areas")
-            for area in (AreaSettings(), AreaSettings(0.3, chosen=True))
+            for area in ((), (Request(max_roll=0.3), True))
         ],
     }
 

@@ -6,7 +6,7 @@ import math
 import pytest
 
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.request import Request, SolverSettings
+from rollcli.estimator.request import Request
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.files.formats import read_image
 from rollcli.stereo.match import StereoOptions, match_pair
@@ -41,7 +41,7 @@ def test_gradient_descent_converges_within_6_iterations_to_the_known_angle(stem)
 
 def test_gradient_descents_iterations_are_within_one_of_the_papers(stem):
     energy = energy_of(disparity_of(stem))
-    counts = [gradient_descent(energy, SolverSettings(delta)).iterations for delta in DELTAS]
+    counts = [gradient_descent(energy, Request(tolerance=delta)).iterations for delta in DELTAS]
     assert all(abs(count - paper) <= 1 for count, paper in zip(counts, PAPER, strict=True)), counts
 
 

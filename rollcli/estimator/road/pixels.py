@@ -1,8 +1,6 @@
 """Which pixels an angle rests on: the road, a part of it, or every valid pixel."""
 
 from dataclasses import dataclass
-from functools import cache
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -11,31 +9,13 @@ from numpy.typing import NDArray
 from rollcli.errors import EstimationError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.moments import CheckedMap, map_moments, point_moments
-from rollcli.estimator.request import AREAS, SOLVERS, AreaSettings, Method, Request
+from rollcli.estimator.request import AREAS, Request
 from rollcli.estimator.road.find import Road, find_road
 from rollcli.estimator.road.sample import take_sample
 from rollcli.estimator.road.surface import Surface, fit_surface, whole_surface
 from rollcli.estimator.solvers.areas import AreaMethod, fit_plane
-from rollcli.estimator.solvers.solution import Solution, Solver
+from rollcli.estimator.solvers.solution import Solution
 from rollcli.estimator.tuning import SampleTuning, Tuning
-
-
-def load_solver(name: str) -> Solver:
-    """Return the function of a solver."""
-    solver: Solver = _load(SOLVERS[name])
-    return solver
-
-
-def load_area_method(name: str) -> AreaMethod:
-    """Return the function of a method that chooses pixels."""
-    method: AreaMethod = _load(AREAS[name])
-    return method
-
-
-@cache
-def _load(method: Method) -> Any:
-    module, function = method.function.split(".")
-    return getattr(import_module(f"rollcli.estimator.solvers.{module}"), function)
 
 
 @dataclass(frozen=True)
@@ -108,8 +88,8 @@ def _area_pixels(
     """Let the method choose among the road's pixels, or the valid ones; a mask is the chosen area."""
     values = checked.values
     candidates = checked.valid if surface is None else checked.valid & surface.covers(values, request.tuning)
-    settings = AreaSettings(request.max_roll, chosen=checked.usable is not None)
-    pixels = load_area_method(request.method)(values, candidates, settings)
+    choose: AreaMethod = AREAS[request.method].load()
+    pixels = choose(values, candidates, request, checked.usable is not None)
     energy, solution = fit_plane(values, pixels)
     sampled = _sampled_surface(values, pixels.used, energy, request.tuning.sample)
     share = np.count_nonzero(pixels.used) / checked.count

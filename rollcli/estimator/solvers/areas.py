@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from rollcli.errors import EstimationError
 from rollcli.estimator.energy import SAME_EVERYWHERE, Energy
 from rollcli.estimator.moments import Floats, Grid, map_moments, require_pixels
-from rollcli.estimator.request import DEFAULT_AREA, AreaSettings
+from rollcli.estimator.request import DEFAULT_REQUEST, Request
 from rollcli.estimator.solvers.exact import exact
 from rollcli.estimator.solvers.solution import Solution, SolverStatus
 
@@ -50,8 +50,9 @@ class AreaPixels:
     status: SolverStatus = SolverStatus.CONVERGED
 
 
-# from a map (H, W), px, and which of its pixels are valid and may be used, (H, W) of bool
-AreaMethod = Callable[[NDArray[Any], NDArray[np.bool_], AreaSettings], AreaPixels]
+# from a map (H, W), px, which of its pixels are valid and may be used, (H, W) of bool, what is asked, and
+# whether these pixels are the chosen area already
+AreaMethod = Callable[[NDArray[Any], NDArray[np.bool_], Request, bool], AreaPixels]
 
 
 class PlaneFit(NamedTuple):
@@ -80,7 +81,10 @@ _COLUMNS = (0.35, 0.65)
 
 
 def lower_centre(
-    disparity: NDArray[Any], usable: NDArray[np.bool_], settings: AreaSettings = DEFAULT_AREA
+    disparity: NDArray[Any],
+    usable: NDArray[np.bool_],
+    request: Request = DEFAULT_REQUEST,
+    chosen: bool = False,
 ) -> AreaPixels:
     """Choose 60 to 90 % of the height and 35 to 65 % of the width, or all usable pixels.
 
@@ -90,7 +94,9 @@ def lower_centre(
         Real numbers, px.
     usable : ndarray of bool, shape (H, W)
         The pixels that are valid and may be used.
-    settings : AreaSettings
+    request : Request
+        Of which this method takes nothing.
+    chosen : bool
         Whether the usable pixels are the chosen area.
 
     Returns
@@ -98,7 +104,7 @@ def lower_centre(
     AreaPixels
         With 0 iterations.
     """
-    if settings.chosen:
+    if chosen:
         return AreaPixels(usable)
     used = np.zeros(disparity.shape, np.bool_)
     area = lower_centre_slices(*disparity.shape)
@@ -180,7 +186,10 @@ _ROUNDING = 1e-10
 
 
 def iterative(
-    disparity: NDArray[Any], usable: NDArray[np.bool_], settings: AreaSettings = DEFAULT_AREA
+    disparity: NDArray[Any],
+    usable: NDArray[np.bool_],
+    request: Request = DEFAULT_REQUEST,
+    chosen: bool = False,
 ) -> AreaPixels:
     """Fit planes to many small areas, and choose those that agree on one.
 
@@ -190,8 +199,10 @@ def iterative(
         Real numbers, px.
     usable : ndarray of bool, shape (H, W)
         The pixels that are valid and may be used.
-    settings : AreaSettings
+    request : Request
         The largest roll of an area's plane.
+    chosen : bool
+        The areas of a chosen one are looked at as others are.
 
     Returns
     -------
@@ -213,12 +224,12 @@ def iterative(
         raise EstimationError(f"no area of {extent}x{extent} pixels is at least half valid")
     grams = grams[filled]
     planes = _fitted(grams)
-    roads = _look_like_road(planes, settings.max_roll)
+    roads = _look_like_road(planes, request.max_roll)
     if not roads.any():
         if np.ptp(disparity[usable]) == 0:
             raise EstimationError(SAME_EVERYWHERE)
         raise EstimationError("no area looks like a road: disparity grows downward in none")
-    agreeing, rounds, status = _agreeing(grams, planes, roads, settings.max_roll)
+    agreeing, rounds, status = _agreeing(grams, planes, roads, request.max_roll)
     covered = _covered(filled[agreeing], across, _STEP * side, extent, disparity.shape)
     return AreaPixels(usable & covered, rounds, status)
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.moments import Floats
-from rollcli.estimator.request import DEFAULT_SOLVER, SolverSettings
+from rollcli.estimator.request import DEFAULT_REQUEST, Request
 from rollcli.estimator.solvers.solution import Solution, angle_between, principal
 
 DEGREE = 5
@@ -63,10 +63,10 @@ class Minimum:
     energy: float
 
 
-def exact(energy: Energy, settings: SolverSettings = DEFAULT_SOLVER) -> Solution:
+def exact(energy: Energy, request: Request = DEFAULT_REQUEST) -> Solution:
     """Return the global minimum; of equal ones, the angle nearest to 0.
 
-    It is polished to machine precision, whatever the tolerance in the settings.
+    It is polished to machine precision, whatever the tolerance in the request.
     """
     return Solution(minima(energy)[0].theta, 0)
 

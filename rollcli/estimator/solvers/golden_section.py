@@ -8,21 +8,21 @@ import math
 from collections.abc import Callable
 
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.request import DEFAULT_SOLVER, SolverSettings
+from rollcli.estimator.request import DEFAULT_REQUEST, Request
 from rollcli.estimator.solvers.solution import Solution, principal
 
 _RATIO = (math.sqrt(5) - 1) / 2
 _FINEST = 1e-15  # radians; a narrower bracket holds no two different numbers
 
 
-def golden_section(energy: Energy, settings: SolverSettings = DEFAULT_SOLVER) -> Solution:
+def golden_section(energy: Energy, request: Request = DEFAULT_REQUEST) -> Solution:
     """Shrink a bracket of one whole period until it is narrower than the tolerance.
 
     Parameters
     ----------
     energy : Energy
         E_min as a function of theta; has period pi.
-    settings : SolverSettings
+    request : Request
 
     Returns
     -------
@@ -34,7 +34,7 @@ def golden_section(energy: Energy, settings: SolverSettings = DEFAULT_SOLVER) ->
     -----
     Assumes one minimum in the bracket. Whole frames can have two: `exact` finds the lower one.
     """
-    return shrink_bracket(lambda theta: energy.at(theta).value, settings.tolerance)
+    return shrink_bracket(lambda theta: energy.at(theta).value, request.tolerance)
 
 
 def shrink_bracket(energy_at: Callable[[float], float], tolerance: float) -> Solution:

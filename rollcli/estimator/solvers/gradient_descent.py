@@ -7,21 +7,21 @@ arXiv:1906.01894.
 import math
 
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.request import DEFAULT_SOLVER, LAMBDA0, SolverSettings
+from rollcli.estimator.request import DEFAULT_REQUEST, LAMBDA0, Request
 from rollcli.estimator.solvers.solution import Solution, SolverStatus, principal
 
 _MAX_ITERATIONS = 100
 _MAX_STEP = math.radians(20)
 
 
-def gradient_descent(energy: Energy, settings: SolverSettings = DEFAULT_SOLVER) -> Solution:
+def gradient_descent(energy: Energy, request: Request = DEFAULT_REQUEST) -> Solution:
     """Descend from theta = 0 until a step is shorter than the tolerance.
 
     Parameters
     ----------
     energy : Energy
         E_min as a function of theta.
-    settings : SolverSettings
+    request : Request
         A first learning rate "auto" is 1 / curvature at the start (Newton's step) where the energy curves
         upward there, else the default.
 
@@ -36,9 +36,9 @@ def gradient_descent(energy: Energy, settings: SolverSettings = DEFAULT_SOLVER) 
     the energy curves downward. So E must fall (else the step is halved), lambda stays positive (else it is
     doubled), and a step is at most 20 degrees.
     """
-    unit, tolerance = energy.normaliser, settings.tolerance
+    unit, tolerance = energy.normaliser, request.tolerance
     theta, now = 0.0, energy.at(0.0)
-    rate = _first_rate(settings, unit * now.curvature)
+    rate = _first_rate(request, unit * now.curvature)
     noise = 1e-14 * (energy.rest + energy.slope_energy)
     for iteration in range(1, _MAX_ITERATIONS + 1):
         step = -rate * unit * now.gradient
@@ -62,8 +62,8 @@ def gradient_descent(energy: Energy, settings: SolverSettings = DEFAULT_SOLVER) 
     return Solution(principal(theta), _MAX_ITERATIONS, SolverStatus.STEP_LIMIT)
 
 
-def _first_rate(settings: SolverSettings, curvature: float) -> float:
+def _first_rate(request: Request, curvature: float) -> float:
     """Return lambda(0), given the curvature of the normalised energy at the start."""
-    if settings.lambda0 != "auto":
-        return float(settings.lambda0)
+    if request.lambda0 != "auto":
+        return float(request.lambda0)
     return 1 / curvature if curvature > 0 else LAMBDA0

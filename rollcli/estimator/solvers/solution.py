@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.request import SolverSettings
+from rollcli.estimator.request import Request
 
 
 class SolverStatus(Enum):
@@ -41,7 +41,7 @@ class Solution:
     status: SolverStatus = SolverStatus.CONVERGED
 
 
-Solver = Callable[[Energy, SolverSettings], Solution]
+Solver = Callable[[Energy, Request], Solution]
 
 
 def principal(theta: float) -> float:
