@@ -93,7 +93,7 @@ class Energy:
         EstimationError
             When the pixels do not determine a plane, or every angle fits them equally well.
         """
-        n = moments.weight
+        n = float(moments.s[0, 0])
         if n <= 0:
             raise EstimationError("no valid pixel: all are zero, negative, not finite or masked out")
         if not _SMALLEST < peak < _LARGEST:
@@ -144,22 +144,7 @@ class Energy:
         -------
         Terms
         """
-        return self._terms(self._rotated(theta))
-
-    def as_quotient(self, c: Floats, s: Floats) -> tuple[Floats, Floats]:
-        """Return numerator and denominator of E_min less `rest`; the latter is det(Y'Y) / weight.
-
-        Both are homogeneous polynomials of degree 6 in c and s, which are the cosine and the sine of theta
-        times a factor: coordinates that are longer by a factor leave E_min as it is.
-        """
-        *rotated, cx, _ = self._in_frame(c, s)
-        xx, xy, yy, _, _, xyy, yyy, _, _, yyyy, _, _, ryy = rotated
-        cx = cx / (c * c + s * s)
-        phi = ryy * yy + cx * (xyy * yy - yyy * xy)
-        determinant = yy * yyyy - yyy * yyy - yy * yy * yy / self.weight
-        return cx * cx * (xx - xy * xy / yy) * determinant - phi * phi / yy, determinant
-
-    def _terms(self, rotated: list[Any]) -> Terms:
+        rotated = self._rotated(theta)
         xx, xy, yy, xxx, xxy, xyy, yyy, xxyy, xyyy, yyyy, rxx, rxy, ryy, cx, cy = rotated
         n = self.weight
         skew, mean = yyy / yy, yy / n  # phi = y^2 - skew y - mean is orthogonal to 1 and y
@@ -181,6 +166,19 @@ class Energy:
         saved = z0 * z0 / n + z1 * z1 / yy + (z2 - skew * z1 - mean * z0) ** 2 * per_phi
         moved = slope * slope * xx + 2 * slope * bend * xxy + bend * bend * xxyy
         return Terms(value, gradient, 2 * (moved - saved - bend * res_xx))
+
+    def as_quotient(self, c: Floats, s: Floats) -> tuple[Floats, Floats]:
+        """Return numerator and denominator of E_min less `rest`; the latter is det(Y'Y) / weight.
+
+        Both are homogeneous polynomials of degree 6 in c and s, which are the cosine and the sine of theta
+        times a factor: coordinates that are longer by a factor leave E_min as it is.
+        """
+        *rotated, cx, _ = self._in_frame(c, s)
+        xx, xy, yy, _, _, xyy, yyy, _, _, yyyy, _, _, ryy = rotated
+        cx = cx / (c * c + s * s)
+        phi = ryy * yy + cx * (xyy * yy - yyy * xy)
+        determinant = yy * yyyy - yyy * yyy - yy * yy * yy / self.weight
+        return cx * cx * (xx - xy * xy / yy) * determinant - phi * phi / yy, determinant
 
     def parabola(self, theta: float) -> Parabola:
         """Return (a0, a1, a2) of the road d = a0 + a1 y + a2 y^2 at `theta`, in pixels.

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.estimator.least_squares import regular, solve_normal, unit
-from rollcli.estimator.moments import Floats, Grid
+from rollcli.estimator.least_squares import solve_normal
+from rollcli.estimator.moments import Floats, Grid, powers
 from rollcli.estimator.road.model import Parabola, Reals, RoadModel
 from rollcli.estimator.road.surface import Surface
 from rollcli.estimator.tuning import IntervalTuning
@@ -64,7 +64,7 @@ class Jackknife:
         """Return the half-widths of theta's interval, radians: by bands, by columns, and the textbook's."""
         turned = (self.bands[:, _THETA], self.columns[:, _THETA])
         bands, columns = (
-            _student(freedom) * math.sqrt(float(thetas.dot(thetas)))
+            float(np.interp(freedom, range(1, len(_T975) + 1), _T975)) * math.sqrt(float(thetas.dot(thetas)))
             for thetas, freedom in zip(turned, self.freedom, strict=True)
         )
         return bands, columns, _NORMAL * math.sqrt(max(0.0, self.white[_THETA, _THETA]))
@@ -238,8 +238,6 @@ def _order(position: Reals) -> NDArray[np.intp]:
 def _solved(total: Floats, groups: Floats, prior: float) -> tuple[Floats, Floats, Floats, Floats]:
     """Solve the normal equations (a0, a1, a2, theta, camber) of all pixels, and of all but a group.
 
-    At once takes less time.
-
     Returns
     -------
     inverse : ndarray, shape (5, 5)
@@ -248,20 +246,16 @@ def _solved(total: Floats, groups: Floats, prior: float) -> tuple[Floats, Floats
         From the surface's parabola to the best one.
     changes : ndarray, shape (groups, 5)
         How they change as one group after the other is left out.
-    bulge : ndarray, shape (5,)
+    bulge : ndarray, shape (4,)
         What a camber of 1 adds to the others, where it is not known.
     """
-    products = np.empty((7 + len(groups), 6, 6))
-    products[:6] = products[-1] = total
-    np.subtract(total, groups, out=products[6:-1])
-    normal, pulls = products[:, :5, :5], products[:, :5, 5:]
-    pulls[:5, :, 0] = unit(5)  # whose solutions are the inverse
-    pulls[-1] = normal[-1, :, _CAMBER:]
-    pulls[-1, _CAMBER] = 0
-    normal[:-1, _CAMBER, _CAMBER] += prior
-    normal[-1, _CAMBER] = normal[-1, :, _CAMBER] = 0
-    solutions: Floats = np.asarray(np.linalg.solve(regular(normal, normal[0]), pulls)[..., 0], np.float64)
-    return solutions[:5], solutions[5], solutions[5] - solutions[6:-1], solutions[-1]
+    normal, pull = total[:5, :5].copy(), total[:5, 5]
+    bulge = solve_normal(normal[:_CAMBER, :_CAMBER], normal[:_CAMBER, _CAMBER])
+    normal[_CAMBER, _CAMBER] += prior
+    inverse = solve_normal(normal, np.eye(5))
+    whole = inverse @ pull
+    changes = whole - solve_normal(normal - groups[:, :5, :5], pull - groups[:, :5, 5])
+    return inverse, whole, changes, bulge
 
 
 def _camber(model: RoadModel, prior_share: float, changes: Floats) -> float | None:
@@ -283,13 +277,6 @@ def _freedom(groups: Floats) -> float:
     """
     leverage = groups[:, _THETA, _THETA].tolist()
     return max(1.0, float(sum(leverage) ** 2 / sum(each * each for each in leverage)) - 1)
-
-
-def _student(freedom: float) -> float:
-    """Return the 97.5 % quantile of Student's t, between whole degrees of freedom by interpolation."""
-    below = min(int(freedom), len(_T975) - 1)
-    part = min(freedom, len(_T975)) - below
-    return _T975[below - 1] + part * (_T975[below] - _T975[below - 1])
 
 
 _MOST_MOVED = 0.05  # of the slope: no road bends more, so what does is no bend of the road
@@ -371,7 +358,10 @@ def touch(
         grid = surface.grid
         along = road.along(surface.x, surface.y)
         centre = float(surface.weights.dot(along)) / float(surface.weights.sum())
-        value, moved = _parabola_of_cubic(along - centre, surface.weights)
+        # value and slope at the point of contact of the parabola that fits a cube
+        rows = powers(along - centre, 3)
+        weighted = rows[:3] * surface.weights
+        value, moved, _ = solve_normal(weighted @ rows[:3].T, weighted @ rows[3]).tolist()
         cubic = value * grid.scale**3, moved * grid.scale**2  # px^3 and px^2
     row = centre * grid.scale + road.along(grid.centre_u, grid.centre_v)
     _, a1, a2 = alpha
@@ -379,17 +369,6 @@ def touch(
     third = _third_power(disparity, slope, a2, cubic[1])
     disparity, slope = disparity - third * cubic[0], slope - third * cubic[1]
     return Tangent(theta, row, disparity, slope, jackknife, grid)
-
-
-def _parabola_of_cubic(along: Reals, weights: Floats) -> tuple[float, float]:
-    """Return value and slope at 0 of the parabola that fits the cubes of some positions of mean 0."""
-    squares = along * along
-    weighted = weights * squares
-    n, two, three = weights.sum(), weighted.sum(), weighted.dot(along)
-    four, five = weighted.dot(squares), weighted.dot(squares * along)
-    products = np.array([[n, 0, two, three], [0, two, three, four], [two, three, four, five]])
-    value, slope, _ = solve_normal(products[:, :3], products[:, 3]).tolist()
-    return value, slope
 
 
 def _third_power(disparity: float, slope: float, bend: float, moved: float) -> float:

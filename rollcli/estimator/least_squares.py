@@ -1,7 +1,5 @@
 """Least squares of a few parameters in different units, some of which may be missing."""
 
-from functools import cache
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,32 +24,7 @@ def solve_normal(normal: Floats, pull: Floats) -> Floats:
     ndarray, shape (..., N)
         0 for what is missing.
     """
-    ridge = unit(normal.shape[-1])
+    ridge = np.eye(normal.shape[-1])
     return np.asarray(
         np.linalg.solve(normal * (1 + _RIDGE * ridge) + _LEAST * ridge, pull[..., None])[..., 0]
     )
-
-
-def regular(normal: Floats, like: Floats) -> Floats:
-    """Return normal matrices that can be inverted though parameters are missing, or not determined.
-
-    Parameters
-    ----------
-    normal : ndarray, shape (..., N, N)
-        Where a parameter is missing, its row and column are 0, and the solution is.
-    like : ndarray, shape (N, N)
-        A normal matrix of such parameters, for their units.
-
-    Returns
-    -------
-    ndarray, shape (..., N, N)
-    """
-    diagonal = like.diagonal()
-    added: Floats = np.where(diagonal > 0, _RIDGE * diagonal, 1.0) * unit(len(diagonal))
-    return normal + added
-
-
-@cache
-def unit(size: int) -> Floats:
-    """Return the unit matrix of this size."""
-    return np.eye(size)

@@ -204,11 +204,6 @@ class Moments:
     t: Floats
     dd: float
 
-    @property
-    def weight(self) -> float:
-        """The sum of the weights: with weights 0 and 1, the number of pixels."""
-        return float(self.s[0, 0])
-
 
 def map_moments(disparity: NDArray[Any], weights: NDArray[Any] | None = None) -> Moments:
     """Sum a map.
