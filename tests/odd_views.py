@@ -1,7 +1,5 @@
 """What a right camera sees that is turned, lower or larger, and the road's plane as `estimate` finds it."""
 
-import math
-
 import cv2
 import numpy as np
 
@@ -33,4 +31,4 @@ def seen_turned(view, yaw_deg=0.0, pitch_deg=0.0, focal=0.7):
 
 def find_road(small):
     """The plane of the road in a small map."""
-    return road_plane(small, None, math.radians(45), 0)
+    return road_plane(small)

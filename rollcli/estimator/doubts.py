@@ -5,7 +5,6 @@ Add a reason: an `if` that yields it, in `doubts_of`.
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from rollcli.estimator.road.pixels import PixelSet
 from rollcli.estimator.road.surface import Surface
 from rollcli.estimator.solvers.exact import CertifiedSolution
 from rollcli.estimator.solvers.solution import angle_between
+from rollcli.estimator.tuning import DoubtTuning
 
 _COLUMNS = 80  # of a view that are looked at; shares need no more
 _BANDS = 20  # from the horizon to the lower border, of equal steps of the road's disparity
@@ -59,18 +59,8 @@ def doubts_of(
     if c2 * math.cos(solution.theta) - c1 * math.sin(solution.theta) < 0:
         yield "the disparity grows upward, as it does in a depth map"
     if road and surface:
-        ground = _ground_of(checked, surface, pixels.energy.rmse(certified.energy), tuning.reach)
-        if ground.width < tuning.narrowest:
-            yield f"the view is as narrow as that of a table: {ground.width:.1f} camera heights"
-        if ground.filled < min(tuning.filled_by_horizon * road.horizon, tuning.most_filled):
-            share = f"{100 * ground.filled:.0f} % of the pixels"
-            yield f"a camera that looks down so far sees more of a road than {share}"
-        if ground.below > tuning.most_below:
-            yield "the plane ends near ahead, as a table does: what is seen there lies below it"
-        if ground.farther < tuning.least_farther:
-            yield "the plane is seen near ahead alone, as a dashboard is"
-        if ground.beyond < tuning.least_beyond:
-            yield "the plane is closed off near ahead, as the floor of a room is"
+        rmse = pixels.energy.rmse(certified.energy)
+        yield from _doubts_of_plane(checked, surface, rmse, road.horizon, tuning)
     if road and road.rival > tuning.rival_share * road.score:
         yield "another plane, with another roll, explains the map nearly as well"
     if surface and surface.moved > tuning.longest_move:
@@ -83,34 +73,10 @@ def doubts_of(
         yield f"the interval is wide: ±{math.degrees(interval.half_width):.2f} degrees"
 
 
-class _Ground(NamedTuple):
-    """What is seen of the road's plane; all but the width are shares from 0 to 1.
-
-    Attributes
-    ----------
-    width : float
-        How wide the view is at its bottom, camera heights.
-    filled : float
-        Of all pixels with data, those on the plane.
-    below : float
-        Of the lane's pixels those below the plane: the most in any band within twice the reach, from where
-        more are on it.
-    beyond : float
-        Of the pixels with data from the reach to twice as far, those on the plane; 1 where few have data.
-    farther : float
-        Of the pixels on the plane, those more than twice as far away as it is at the lower border; 1 where
-        the upper border, or a mask, lets few be seen.
-    """
-
-    width: float
-    filled: float
-    below: float
-    beyond: float
-    farther: float
-
-
-def _ground_of(checked: CheckedMap, surface: Surface, rmse: float, reach: float) -> _Ground:
-    """Look at a map as from the place of the camera over a road.
+def _doubts_of_plane(
+    checked: CheckedMap, surface: Surface, rmse: float, horizon: float, tuning: DoubtTuning
+) -> Iterator[str]:
+    """Yield what speaks for another plane than a road's, as a camera in its place would see it.
 
     Tables, shelves and the floors of rooms are as even as roads. But a camera that stands on a road sees
     about its own height to the sides at least, its road fills the view the more the further down it looks,
@@ -124,10 +90,11 @@ def _ground_of(checked: CheckedMap, surface: Surface, rmse: float, reach: float)
         The road.
     rmse : float
         Of its pixels, px.
-    reach : float
-        How far a road goes on at least: to where the view is so many camera heights wide. Where the upper
-        border lets it be seen less than twice as far, what is beyond half as far as that counts for what is
-        beyond the reach.
+    horizon : float
+        Of the plane: see `Road`.
+    tuning : DoubtTuning
+        A road goes on to its `reach` at least. Where the upper border lets it be seen less than twice as far,
+        what is beyond half as far as that counts for what is beyond the reach.
     """
     height, width = checked.values.shape
     step = -(-width // _COLUMNS)
@@ -143,9 +110,14 @@ def _ground_of(checked: CheckedMap, surface: Surface, rmse: float, reach: float)
     nearest, farthest = model.disparity_along(bottom), model.disparity_along(top)
     _, slope, bend = model.alpha
     wide = width / grid.scale * abs(slope + 2 * bend * bottom) / nearest if nearest > 0 else math.inf
+    if wide < tuning.narrowest:
+        yield f"the view is as narrow as that of a table: {wide:.1f} camera heights"
+    filled = float(on_road.sum()) / max(1.0, float(valid.sum()))
+    if filled < min(tuning.filled_by_horizon * horizon, tuning.most_filled):
+        yield f"a camera that looks down so far sees more of a road than {100 * filled:.0f} % of the pixels"
     nearest = max(nearest, 1e-9)  # a road may end above the border: then nothing is said of what is ahead
     near = road * (1 / nearest)  # 1 at the lower border, 0 at the horizon
-    at_reach = wide / reach
+    at_reach = wide / tuning.reach
     bands = np.clip(near * _BANDS, 0, _BANDS - 1).astype(np.intp)
     in_lane, lower, on = (
         np.bincount(bands[those], minlength=_BANDS) for those in (lane, lane & below, lane & on_road)
@@ -155,19 +127,15 @@ def _ground_of(checked: CheckedMap, surface: Surface, rmse: float, reach: float)
     # nor is it one between road and road: a puddle mirrors the sky, which is far below
     between = np.append(begun[1:], False) & (np.cumsum(on) > np.cumsum(lower))
     some = begun & ~between & (in_lane >= _FEW) & (np.arange(_BANDS) + 0.5 >= _BANDS / 2 * at_reach)
+    if (lower[some] > tuning.most_below * in_lane[some]).any():
+        yield "the plane ends near ahead, as a table does: what is seen there lies below it"
+    ground = road > 0 if checked.usable is None else (road > 0) & checked.usable[::step, ::step]
+    farther = ground & (near < 0.5)  # more than twice as far away as at the lower border
+    few = on_road[farther].sum() < tuning.least_farther * max(1, on_road[ground].sum())
+    if few and farther.sum() > _ENOUGH * ground.sum():
+        yield "the plane is seen near ahead alone, as a dashboard is"
     begins = max(at_reach, 2 * farthest / nearest)
     ahead = (near < begins) & (near > begins / 2)
     seen = valid & ahead
-    ground = road > 0 if checked.usable is None else (road > 0) & checked.usable[::step, ::step]
-    farther = ground & (near < 0.5)
-    return _Ground(
-        width=wide,
-        filled=float(on_road.sum()) / max(1.0, float(valid.sum())),
-        below=float(np.max(lower[some] / in_lane[some], initial=0)),
-        beyond=float(on_road[seen].mean()) if seen.sum() > _ENOUGH * ahead.sum() else 1.0,
-        farther=(
-            float(on_road[farther].sum()) / max(1.0, float(on_road[ground].sum()))
-            if farther.sum() > _ENOUGH * ground.sum()
-            else 1.0
-        ),
-    )
+    if seen.sum() > _ENOUGH * ahead.sum() and on_road[seen].mean() < tuning.least_beyond:
+        yield "the plane is closed off near ahead, as the floor of a room is"

@@ -285,7 +285,7 @@ def _road(allowed: NDArray[np.bool_] | None, request: Request, small: NDArray[An
     if allowed is not None:
         v, u = (np.arange(few) * many // few for few, many in zip(small.shape, allowed.shape, strict=True))
         allowed = allowed[v[:, None], u]
-    return road_plane(small, allowed, request.max_roll, request.seed)
+    return road_plane(small, allowed, request)
 
 
 def _doubt_of_range(match: "StereoMatch") -> str:

@@ -1,6 +1,5 @@
 """Disparity maps from stereo pairs: range found, views levelled, then one match."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -10,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
-from rollcli.estimator.request import MAX_ROLL_DEG
-from rollcli.estimator.road.find import Plane, road_plane
+from rollcli.estimator.road.find import road_plane
 from rollcli.stereo.alignment import (
     Approach,
     Measured,
@@ -241,12 +239,8 @@ def compute_disparity(
         align,
         vertical_offset,
     )
-    match = match_pair(left, right, options, Wanted(road=_plane_of_road, whole=True))
+    match = match_pair(left, right, options, Wanted(road=road_plane, whole=True))
     return match.disparity if match.whole is None else match.whole
-
-
-def _plane_of_road(small: Map) -> Plane | None:
-    return road_plane(small, None, math.radians(MAX_ROLL_DEG), 0)
 
 
 def match_pair(

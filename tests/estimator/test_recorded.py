@@ -8,7 +8,7 @@ import numpy as np
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.moments import CheckedMap
-from rollcli.estimator.request import AREAS, LAMBDA0, MAX_ROLL_DEG, Request
+from rollcli.estimator.request import AREAS, LAMBDA0, Request
 from rollcli.estimator.road.find import road_plane
 from rollcli.estimator.road.pixels import select_pixels
 from rollcli.estimator.solvers.exact import minima
@@ -160,7 +160,7 @@ def _behind(name):
     return {
         "road": road and {"score": road.score, "rival": road.rival, "horizon": road.horizon},
         "surface": surface and {"moved": surface.moved, "alpha": surface.model.alpha},
-        "plane": road_plane(MAPS[name](), None, math.radians(MAX_ROLL_DEG), 0),
+        "plane": road_plane(MAPS[name]()),
     }
 
 

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from rollcli.errors import EstimationError
 from rollcli.estimator.least_squares import solve_normal
 from rollcli.estimator.moments import Floats, Singles
+from rollcli.estimator.request import DEFAULT_REQUEST, Request
 from rollcli.estimator.road.model import RoadModel
 from rollcli.estimator.road.sample import Sample, every, quantile, take_sample, values_at
-from rollcli.estimator.tuning import TUNING, SearchTuning, Tuning
+from rollcli.estimator.tuning import SearchTuning
 
 Plane = tuple[float, float, float]
 """Disparity at pixel (0, 0), px, and what a pixel to the right and one further down add, of a map."""
@@ -62,17 +63,14 @@ class Road:
         return float(c0) / math.hypot(c1, c2)
 
 
-def find_road(sample: Sample, max_roll: float, seed: int, tuning: Tuning) -> Road:
+def find_road(sample: Sample, request: Request) -> Road:
     """Find the plane of the road.
 
     Parameters
     ----------
     sample : Sample
-    max_roll : float
-        The largest abs(roll) considered, radians; more than 0, less than pi / 2.
-    seed : int
-        Of the triples drawn.
-    tuning : Tuning
+    request : Request
+        The largest roll considered, the seed of the triples drawn, and the tuning.
 
     Returns
     -------
@@ -82,12 +80,12 @@ def find_road(sample: Sample, max_roll: float, seed: int, tuning: Tuning) -> Roa
     ------
     EstimationError
         When no plane through the pixels rises downward in the image, as a road's disparity does, and is
-        rolled by less than `max_roll`, or none has pixels on it.
+        rolled by less than the largest one, or none has pixels on it.
     """
-    search, other = tuning.search, tuning.doubts.other_angle
-    planes = draw_planes(sample, max_roll, seed, search)
+    search, other = request.tuning.search, request.tuning.doubts.other_angle
+    planes = draw_planes(sample, request)
     if len(planes) == 0:
-        raise EstimationError(_why_no_plane(sample, max_roll))
+        raise EstimationError(_why_no_plane(sample, request.max_roll))
     judge = Judge(sample, search)
     scores = judge.scores(planes, every(judge.pixels, search.first_pixels))
     bins, best = np.floor(_rolls(planes) / other).tolist(), dict[float, int]()
@@ -97,7 +95,7 @@ def find_road(sample: Sample, max_roll: float, seed: int, tuning: Tuning) -> Roa
             break
     planes = start = planes[list(best.values())]
     planes = judge.refined(planes)
-    within = np.abs(planes[:, 1]) <= math.tan(max_roll) * planes[:, 2]
+    within = np.abs(planes[:, 1]) <= math.tan(request.max_roll) * planes[:, 2]
     planes = planes[within] if within.any() else start[:1]
     scores, rolls = judge.scores(planes, slice(None)), _rolls(planes)
     winner = int(scores.argmax())
@@ -124,16 +122,16 @@ def _why_no_plane(sample: Sample, max_roll: float) -> str:
     )
 
 
-def draw_planes(sample: Sample, max_roll: float, seed: int, tuning: SearchTuning) -> Singles:
+def draw_planes(sample: Sample, request: Request) -> Singles:
     """Return planes (K, 3) through triples of neighbouring coherent pixels, disparity growing downward."""
-    radius = tuning.radius
+    radius, draws = request.tuning.search.radius, request.tuning.search.draws
     x, y, d = (each[sample.few] for each in (sample.x, sample.y, sample.d))
     pool = (sample.coherent & (sample.slopes[1] > 0)).nonzero()[0]
     if len(pool) < 3:
         return np.empty((0, 3), np.float32)
     pool = pool[sample.column[pool].argsort(kind="stable")]
     column = sample.column[pool].astype(np.intp)
-    first, second, third = _draws(seed, tuning.draws)
+    first, second, third = _draws(request.seed, draws)
     central = pool[np.abs(x[pool]) < radius]  # the road is more likely there
     both = np.concatenate([pool, central])
     a = both[(first * len(both)).astype(np.intp)]
@@ -146,7 +144,7 @@ def draw_planes(sample: Sample, max_roll: float, seed: int, tuning: SearchTuning
     wide = (np.abs(area) > 0.03 * radius**2) & (np.maximum(np.abs(y1), np.abs(y2)) < radius)
     area = np.where(wide, area, 1)
     c1, c2 = (d1 * y2 - d2 * y1) / area, (x1 * d2 - x2 * d1) / area
-    good = (wide & (c2 > 0) & (np.abs(c1) <= math.tan(max_roll) * c2)).nonzero()[0][: tuning.draws // 2]
+    good = (wide & (c2 > 0) & (np.abs(c1) <= math.tan(request.max_roll) * c2)).nonzero()[0][: draws // 2]
     planes: Singles = np.stack([d[a] - c1 * x[a] - c2 * y[a], c1, c2], 1)[good]
     return planes
 
@@ -244,7 +242,7 @@ def _rolls(planes: Singles) -> Singles:
 
 
 def road_plane(
-    disparity: NDArray[Any], usable: NDArray[np.bool_] | None, max_roll: float, seed: int
+    disparity: NDArray[Any], usable: NDArray[np.bool_] | None = None, request: Request = DEFAULT_REQUEST
 ) -> Plane | None:
     """Return the plane of the road in a small map; None where no road is found.
 
@@ -254,12 +252,12 @@ def road_plane(
         A small map, px; <= 0 is no data.
     usable : ndarray of bool, shape (H, W), or None
         Its pixels that may be used, where not all may.
-    max_roll, seed
+    request : Request
         See `find_road`.
     """
     try:
-        sample = take_sample(disparity, usable, TUNING.sample)
-        c0, c1, c2 = find_road(sample, max_roll, seed, TUNING).plane.tolist()
+        sample = take_sample(disparity, usable, request.tuning.sample)
+        c0, c1, c2 = find_road(sample, request).plane.tolist()
     except EstimationError:
         return None
     grid = sample.grid

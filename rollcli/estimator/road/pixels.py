@@ -68,8 +68,8 @@ def select_pixels(checked: CheckedMap, request: Request) -> PixelSet:
     road, surface = None, None
     if request.road == "auto":
         sample = take_sample(values, usable, tuning.sample, request.middle)
-        road = find_road(sample, request.max_roll, request.seed, tuning)
-        surface = fit_surface(sample, road, parabolic=request.parabolic, tuning=tuning)
+        road = find_road(sample, request)
+        surface = fit_surface(sample, road, request)
     if request.method in AREAS:
         return _area_pixels(checked, road, surface, request)
     if surface is not None:

@@ -46,7 +46,7 @@ class Spacing(NamedTuple):
 
     def first(self, reach: int) -> tuple[int, int]:
         """Return the first row and column of these."""
-        return reach + (self.rows // 2) % self.rows, reach + (self.columns // 2) % self.columns
+        return reach + self.rows // 2, reach + self.columns // 2
 
 
 @dataclass(frozen=True)
@@ -139,9 +139,8 @@ def take_sample(
     height, width = disparity.shape
     grid, reach = Grid.of_shape(height, width, middle), reach_of(height, width, tuning)
     spacing, chosen = _chosen(disparity, usable, reach, tuning)
-    at, right, down, columns = _lattice(grid, height, width, reach, spacing)
-    places, column = at.take(chosen, mode="clip"), columns.take(chosen, mode="clip")
-    x, y = right.take(chosen, mode="clip"), down.take(chosen, mode="clip")
+    lattice = _lattice(grid, height, width, reach, spacing)
+    places, x, y, column = (each.take(chosen, mode="clip") for each in lattice)
     d = values_at(places, disparity)
     few = every(len(d), tuning.coarse_pixels)
     few_d = d[few].copy()
@@ -179,7 +178,7 @@ def take_sample(
         usable=usable,
         reach=reach,
         spacing=spacing,
-        lowest=float(down[-1]),
+        lowest=float(lattice[2][-1]),
     )
 
 
@@ -204,20 +203,13 @@ def _chosen(
 
 
 @lru_cache(maxsize=4)
-def _lattice(
-    grid: Grid, height: int, width: int, reach: int, spacing: Spacing
-) -> tuple[NDArray[np.intp], Singles, Singles, NDArray[np.uint16]]:
+def _lattice(grid: Grid, height: int, width: int, reach: int, spacing: Spacing) -> tuple[NDArray[Any], ...]:
     """Return the places in the map, x, y and the column in the lattice of all pixels so far apart."""
     top, left = spacing.first(reach)
     v, u = np.arange(top, height - reach, spacing.rows), np.arange(left, width - reach, spacing.columns)
     x, y = (each.astype(np.float32) for each in grid.normalised(u, v))
-    shape = (len(v), len(u))
-    return (
-        (v[:, None] * width + u).ravel(),
-        np.broadcast_to(x, shape).ravel(),
-        np.broadcast_to(y[:, None], shape).ravel(),
-        np.broadcast_to(np.arange(len(u), dtype=np.uint16), shape).ravel(),
-    )
+    places, column = v[:, None] * width + u, np.arange(len(u), dtype=np.uint16)
+    return tuple(np.broadcast_to(each, places.shape).ravel() for each in (places, x, y[:, None], column))
 
 
 def every(count: int, pixels: int) -> slice:

@@ -19,6 +19,7 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.least_squares import solve_normal
 from rollcli.estimator.moments import Floats, Grid, Singles, powers, strips
+from rollcli.estimator.request import Request
 from rollcli.estimator.road.find import HARDLY_A_PIXEL, Road, agreement
 from rollcli.estimator.road.model import Reals, RoadModel
 from rollcli.estimator.road.sample import (
@@ -138,7 +139,7 @@ def whole_surface(sample: Sample, energy: Energy) -> Surface:
     return Surface(x, y, d, np.ones(len(d)), model, sample.grid, sample.noise, energy.parabolic)
 
 
-def fit_surface(sample: Sample, road: Road, *, parabolic: bool, tuning: Tuning) -> Surface:
+def fit_surface(sample: Sample, road: Road, request: Request) -> Surface:
     """Fit the road's parabola, roll and camber to the pixels near the road's plane.
 
     The lane ahead of the rig is fitted first. The profile across it says how much of the ground beside it is
@@ -148,9 +149,8 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool, tuning: Tuning) 
     ----------
     sample : Sample
     road : Road
-    parabolic : bool
-        The road model: parabola or line.
-    tuning : Tuning
+    request : Request
+        The road model, parabola or line, and the tuning.
 
     Returns
     -------
@@ -161,7 +161,7 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool, tuning: Tuning) 
     EstimationError
         When hardly any pixel lies on the road.
     """
-    near = _near_pixels(sample, road, parabolic, tuning)
+    near = _near_pixels(sample, road, request)
     lane = near.lane(road.model)
     level, near = near.profiled(lane)
     model, weights, bulge, camber_precision, limit = near.fitted(lane)
@@ -177,7 +177,7 @@ def fit_surface(sample: Sample, road: Road, *, parabolic: bool, tuning: Tuning) 
         model,
         sample.grid,
         sample.noise,
-        parabolic,
+        request.parabolic,
         share=min(1.0, len(used) * near.stride / len(sample.d)),
         moved=abs(model.theta - road.model.theta),
         level=level,
@@ -207,11 +207,8 @@ class NearPixels:
         Tolerances within which a pixel counts in any case.
     stride : int
         How many near pixels each of these stands for.
-    independent_pixels : int
-        As in `IntervalTuning`.
-    parabolic : bool
-        The road model: parabola or line.
-    tuning : FitTuning
+    request : Request
+        The road model, parabola or line, and the tuning.
     """
 
     places: Singles
@@ -222,9 +219,12 @@ class NearPixels:
     ahead: Singles
     least_width: float
     stride: int
-    independent_pixels: int
-    parabolic: bool
-    tuning: FitTuning
+    request: Request
+
+    @property
+    def tuning(self) -> FitTuning:
+        """Numbers of the fit."""
+        return self.request.tuning.fit
 
     def lane(self, start: RoadModel) -> RoadModel:
         """Fit the lane ahead, in one round: it only has to show the profile.
@@ -259,15 +259,10 @@ class NearPixels:
         fade = np.exp(-np.square(np.square(np.minimum(np.square(side / np.float32(tuning.profile)), 4))))
         weights = (_level_at(level, side, tuning) * fade).astype(np.float32)
         kept = (weights > 1e-3).nonzero()[0]  # others would only take time
-        return level, replace(
-            self,
-            places=self.places[:, kept],
-            d=self.d[kept],
-            alone=self.alone[kept],
-            tolerance=self.tolerance[kept],
-            place=self.place[kept] * weights[kept],
-            ahead=self.ahead[kept],
-        )
+        arrays = ("places", "d", "alone", "tolerance", "place", "ahead")
+        pixels = {name: getattr(self, name)[..., kept] for name in arrays}
+        pixels["place"] *= weights[kept]
+        return level, replace(self, **pixels)
 
     def fitted(self, start: RoadModel) -> tuple[RoadModel, Singles, Singles, float, float]:
         """Fit (a0, a1, a2, theta) and the camber, starting from the lane's.
@@ -296,7 +291,7 @@ class NearPixels:
             products = self._products(design, weights)
             # the variance of the pixels over that of the prior, times how often they repeat each other
             total = products[0, 0]
-            repeated = max(1.0, total / self.independent_pixels)
+            repeated = max(1.0, total / self.request.tuning.interval.independent_pixels)
             precision = products[5, 5] / total * repeated / tuning.camber**2
             products[3, 3] += precision
             products[3, 5] -= precision * model.camber
@@ -329,7 +324,7 @@ class NearPixels:
 
     def _products(self, design: Singles, weights: Singles) -> Floats:
         """Return the normal equations of a design (6, N), right-hand side included: shape (6, 6)."""
-        if not self.parabolic:
+        if not self.request.parabolic:
             design[2] = 0
         products: Floats = (design * weights).dot(design.T).astype(np.float64)
         if not products[0, 0] > 0:
@@ -346,9 +341,9 @@ class NearPixels:
         return max(self.least_width, self.tuning.width * math.sqrt(float(weights.dot(squares)) / total))
 
 
-def _near_pixels(sample: Sample, road: Road, parabolic: bool, tuning: Tuning) -> NearPixels:
+def _near_pixels(sample: Sample, road: Road, request: Request) -> NearPixels:
     """Take the pixels near a road's plane."""
-    fit, model = tuning.fit, road.model
+    tuning, fit, model = request.tuning, request.tuning.fit, road.model
     c0, c1, c2 = road.plane.tolist()
     close = np.abs(c0 + c1 * sample.x + c2 * sample.y - sample.d) < _REACH * sample.tolerance
     stride = -(-int(np.count_nonzero(close)) // fit.pixels) or 1
@@ -372,9 +367,7 @@ def _near_pixels(sample: Sample, road: Road, parabolic: bool, tuning: Tuning) ->
         ahead=np.exp(-np.minimum(ahead, MOST_FADED)) + np.float32(0.01),  # a lane may be hidden
         least_width=least,
         stride=stride,
-        independent_pixels=tuning.interval.independent_pixels,
-        parabolic=parabolic,
-        tuning=fit,
+        request=request,
     )
 
 

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.energy import SAME_EVERYWHERE, Energy
+from rollcli.estimator.least_squares import solve_normal
 from rollcli.estimator.moments import Floats, Grid, map_moments, require_pixels
 from rollcli.estimator.request import DEFAULT_REQUEST, Request
 from rollcli.estimator.solvers.exact import exact
@@ -182,7 +183,7 @@ _TOLERANCE = 0.01  # of the mean disparity
 _NOISE, _SMOOTH = 1.5, 0.1  # or 1.5 times the residual of the smoothest tenth: noise, whole pixels
 _TRIED = 200  # about as many planes compete to be the best
 _ROUNDS = 20
-_ROUNDING = 1e-10
+_LEVEL = 1e-6  # of the disparity in the middle: a plane that rises by less does so by rounding alone
 
 
 def iterative(
@@ -239,16 +240,7 @@ def _fitted(grams: Floats) -> Floats:
 
     An area is at least half valid, so that its pixels do determine a plane.
     """
-    n = grams[:, 0, 0]
-    p, q, d = (grams[:, 0, k] / n for k in (1, 2, 3))
-    pp, qq = grams[:, 1, 1] - n * p * p, grams[:, 2, 2] - n * q * q
-    pq = grams[:, 1, 2] - n * p * q
-    pd, qd = grams[:, 1, 3] - n * p * d, grams[:, 2, 3] - n * q * d
-    spread = pp * qq - pq * pq
-    rounding = _ROUNDING * d * np.sqrt(n * (pp + qq))  # lest a constant area rise by rounding alone
-    spread = np.where(np.hypot(pd, qd) <= rounding, np.inf, spread)
-    c1, c2 = (qq * pd - pq * qd) / spread, (pp * qd - pq * pd) / spread
-    return np.stack([d - c1 * p - c2 * q, c1, c2], axis=-1)
+    return solve_normal(grams[:, :3, :3], grams[:, :3, 3])
 
 
 def _misfit(grams: Floats, planes: Floats) -> Floats:
@@ -262,8 +254,8 @@ def _misfit(grams: Floats, planes: Floats) -> Floats:
 
 def _look_like_road(planes: Floats, max_roll: float) -> NDArray[np.bool_]:
     """Return which planes (N, 3) have a disparity that grows downward, and a roll within bounds."""
-    _, c1, c2 = planes.T
-    roads: NDArray[np.bool_] = (c2 > 0) & (np.abs(c1) <= math.tan(max_roll) * c2)
+    c0, c1, c2 = planes.T
+    roads: NDArray[np.bool_] = (c2 > _LEVEL * np.abs(c0)) & (np.abs(c1) <= math.tan(max_roll) * c2)
     return roads
 
 

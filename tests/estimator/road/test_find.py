@@ -269,9 +269,6 @@ def test_what_cannot_be_squared_is_refused(matched, factor):
         estimate_roll(matched[0][2] * np.float32(factor))
 
 
-MAX_ROLL = math.radians(45)
-
-
 def plane(roll_deg, horizon, shape=(110, 146), slope=0.2):
     """A road of this roll, whose horizon crosses the middle column in this row; nothing is above it."""
     v, u = np.indices(shape)
@@ -285,7 +282,7 @@ def plane(roll_deg, horizon, shape=(110, 146), slope=0.2):
 @pytest.mark.parametrize("roll_deg", [-30, -8, 0, 3, 20])
 @pytest.mark.parametrize("horizon", [-20, 30, 40, 52.5])
 def test_the_plane_of_a_small_map_is_that_of_its_road(roll_deg, horizon):
-    at_origin, across, down = road_plane(plane(roll_deg, horizon), None, MAX_ROLL, 0)
+    at_origin, across, down = road_plane(plane(roll_deg, horizon))
     roll = math.radians(roll_deg)
     assert (across, down) == pytest.approx((-0.2 * math.sin(roll), 0.2 * math.cos(roll)), abs=0.003)
     assert -(at_origin + across * 145 / 2) / down == pytest.approx(horizon, abs=0.3)
@@ -293,7 +290,7 @@ def test_the_plane_of_a_small_map_is_that_of_its_road(roll_deg, horizon):
 
 @pytest.mark.parametrize("disparity", [np.zeros((110, 146)), np.full((110, 146), 9.0), plane(0, 40)[::-1]])
 def test_where_no_road_is_found_there_is_no_plane(disparity):
-    assert road_plane(disparity.astype(np.float32), None, MAX_ROLL, 0) is None
+    assert road_plane(disparity.astype(np.float32)) is None
 
 
 def test_only_usable_pixels_tell_the_plane():
@@ -302,7 +299,7 @@ def test_only_usable_pixels_tell_the_plane():
     both = np.where(half, low, high)
     left = np.broadcast_to(half, both.shape)
     for usable, horizon in ((left, 60), (~left, 30)):
-        at_origin, _, down = road_plane(both, usable, MAX_ROLL, 0)
+        at_origin, _, down = road_plane(both, usable)
         assert -at_origin / down == pytest.approx(horizon, abs=0.3)
 
 

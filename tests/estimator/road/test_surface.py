@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.request import Request
 from rollcli.estimator.road.find import find_road
 from rollcli.estimator.road.sample import take_sample
 from rollcli.estimator.road.surface import fit_surface
@@ -38,8 +39,8 @@ def disparity_of(height_at, roll_deg=0.0, pitch_deg=6.0):
 
 def surface_of(disparity, *, parabolic=True):
     sample = take_sample(disparity, None, TUNING.sample)
-    road = find_road(sample, math.radians(45), 0, TUNING)
-    return fit_surface(sample, road, parabolic=parabolic, tuning=TUNING)
+    request = Request(model="parabola" if parabolic else "line")
+    return fit_surface(sample, find_road(sample, request), request)
 
 
 def found_in(height_at, roll_deg=0.0):
