@@ -18,7 +18,7 @@ from rollcli.rig.pose import with_pose
 from rollcli.run.diagnosis import PYTHON, looks_like
 from rollcli.run.find import given_calibration
 from rollcli.run.options import FrameOptions, MethodOptions
-from rollcli.run.read import matched_source, wanted_of
+from rollcli.run.read import matched_source, road_finder
 from rollcli.stereo.options import StereoOptions
 
 
@@ -193,7 +193,7 @@ def estimate_pair(
     allowed = None if mask is None else usable_of(mask)
     if allowed is not None and not allowed.any():
         raise UsageError("the mask leaves no pixel of the map: give an array that is not all zero")
-    source = matched_source(left, right, stereo or StereoOptions(), wanted_of(allowed, request))
+    source = matched_source(left, right, stereo or StereoOptions(), road_finder(allowed, request))
     rig = source.calibrated(rig)
     request = replace(request, slope_error=source.slope_error, middle=None if rig is None else rig.cx)
     estimate = estimator.estimate_roll(source.disparity, request, mask=allowed, road_mask=road_mask)

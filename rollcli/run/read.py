@@ -28,7 +28,8 @@ from rollcli.run.options import FrameOptions, RegionOptions
 from rollcli.stereo.options import StereoOptions
 
 if TYPE_CHECKING:
-    from rollcli.stereo.match import StereoMatch, Wanted
+    from rollcli.stereo.along_road import FindRoad
+    from rollcli.stereo.match import StereoMatch
 
 
 def region_mask(mask: str | None, options: FrameOptions, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
@@ -107,8 +108,8 @@ class Source:
         How the right view lay, by column of a result; empty for a map, and where that could not be told.
     size : tuple of int, or None
         Width and height of the images in the files, px, where the map was matched from them.
-    whole : ndarray, shape (H, W), or None
-        The map of a pair with all rows at full size, where images are to show it.
+    match : StereoMatch or None
+        Of a pair: it has the map with all rows at full size, which images show.
     photo : ndarray or None
         The left image of a pair, grey or BGR, where something is to be drawn on it.
     """
@@ -124,7 +125,7 @@ class Source:
     note: str = ""
     alignment: Mapping[str, Any] = field(default_factory=dict)
     size: tuple[int, int] | None = None
-    whole: NDArray[Any] | None = None
+    match: "StereoMatch | None" = None
     photo: NDArray[Any] | None = None
 
     @property
@@ -154,7 +155,7 @@ class Source:
     @property
     def shown(self) -> NDArray[Any]:
         """The map that images show, px, shape (H, W)."""
-        return self.disparity if self.whole is None else self.whole
+        return self.disparity if self.match is None else self.match.whole
 
 
 def read_source(frame: Frame, options: FrameOptions) -> Source:
@@ -220,8 +221,8 @@ def _match(frame: Frame, options: FrameOptions) -> Source:
 
     left, right = read_views(frame, options)
     allowed = region_mask(frame.mask, options, matched_shape(left.shape, options.stereo.downscale))
-    wanted = wanted_of(allowed, options.method.request(), whole=bool(options.images.folders()))
-    source = matched_source(left, right, options.stereo, wanted)
+    find_road = road_finder(allowed, options.method.request())
+    source = matched_source(left, right, options.stereo, find_road)
     if not np.any(source.disparity):
         raise InputError(f"{frame.file}: no pixel could be matched with the right image")
     return replace(source, photo=left if options.images.needs_photo else None, allowed=allowed)
@@ -249,12 +250,12 @@ def decoded(frame: Frame, options: FrameOptions) -> Frame:
 
 
 def matched_source(
-    left: NDArray[Any], right: NDArray[Any], options: StereoOptions, wanted: "Wanted"
+    left: NDArray[Any], right: NDArray[Any], options: StereoOptions, find_road: "FindRoad | None"
 ) -> Source:
-    """Match a pair for the estimate."""
+    """Match a pair for the estimate; see `match_pair`."""
     from rollcli.stereo.match import match_pair
 
-    match = match_pair(left, right, options, wanted)
+    match = match_pair(left, right, options, find_road)
     searched = (match.min_disparity, match.min_disparity + match.num_disparities - 1)
     height, width = left.shape[:2]
     alignment = {}
@@ -269,15 +270,13 @@ def matched_source(
         note=_LACKS_ROAD if match.lacks_road else "",
         alignment=alignment,
         size=(width, height),
-        whole=match.whole,
+        match=match,
     )
 
 
-def wanted_of(allowed: NDArray[np.bool_] | None, request: Request, *, whole: bool = False) -> "Wanted":
-    """Say what of a pair's map the estimate needs; `allowed` has the shape that is matched at."""
-    from rollcli.stereo.match import Wanted
-
-    return Wanted(road=partial(_road, allowed, request) if request.road == "auto" else None, whole=whole)
+def road_finder(allowed: NDArray[np.bool_] | None, request: Request) -> "FindRoad | None":
+    """Return what finds the road of a pair, if that is asked; `allowed` has the shape that is matched at."""
+    return partial(_road, allowed, request) if request.road == "auto" else None
 
 
 def _road(allowed: NDArray[np.bool_] | None, request: Request, small: NDArray[Any]) -> Plane | None:

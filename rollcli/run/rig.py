@@ -24,7 +24,7 @@ from rollcli.run.find import Calibrations
 from rollcli.run.frame import Frame
 from rollcli.run.options import FrameOptions, RigOptions
 from rollcli.run.outputs import check_named_once, listed_only
-from rollcli.run.read import FRAME_ERRORS, read_views, wanted_of
+from rollcli.run.read import FRAME_ERRORS, read_views, road_finder
 from rollcli.run.result_rows import frame_of_row
 from rollcli.run.resume import recorded_options
 from rollcli.run.rig_gates import check_options, health_of, run_checks, status_of
@@ -275,8 +275,8 @@ def columns_of_drive(rig: RigAssessment, results: Sequence[str]) -> ColumnSuppor
     for frame, options in _pairs(rig, results):
         try:
             left, right = read_views(frame, options)
-            wanted = wanted_of(None, options.method.request())
-            measured = match_pair(left, right, options.stereo, wanted).measured
+            find_road = road_finder(None, options.method.request())
+            measured = match_pair(left, right, options.stereo, find_road).measured
         except FRAME_ERRORS:  # the pairs that are left may be enough
             continue
         if measured is not None:

@@ -54,21 +54,6 @@ _FEWEST_ON, _FEWEST_FOUND = 0.15, 0.5
 _AS_FAR = 3.0  # px: what is found there is as far off as the small map says
 
 
-class Search(NamedTuple):
-    """Where and how a pair is matched.
-
-    Attributes
-    ----------
-    first, width : int
-        The range of disparities, px.
-    options : StereoOptions
-    """
-
-    first: int
-    width: int
-    options: StereoOptions
-
-
 @dataclass(frozen=True, eq=False)
 class Levelled:
     """A pair whose right view is levelled when it is resampled: whole, smaller, or along a plane.
@@ -83,8 +68,12 @@ class Levelled:
         How the right one lies.
     seen : ndarray of float32 or None
         A map of the pair at any size, in its own pixels: a tilt moves near points further.
-    search : Search
+    first, count : int
+        The range of disparities, px.
+    options : StereoOptions
+        How the pair is matched.
     find_road : callable or None
+        None: nothing is matched along a road.
     blank : ndarray of bool, shape (H, W), or None
         Pixels of the left view that show nothing: what a match finds there is no data.
     """
@@ -92,7 +81,9 @@ class Levelled:
     views: Views
     lies: Misalignment
     seen: Map | None
-    search: Search
+    first: int
+    count: int
+    options: StereoOptions
     find_road: FindRoad | None
     blank: NDArray[np.bool_] | None = None
 
@@ -116,12 +107,11 @@ class Levelled:
         """The map at a third of the size; None where it would be too narrow."""
         left, right = shrink_both(self.views, _SMALLER)
         views = left, level(right, self.lies.resized(1 / _SMALLER), self._near)
-        first, options = self.search.first // _SMALLER, self.search.options
-        width = -(-self.search.width // _SMALLER)
-        count = usable_range(width, first, left.shape[1], options.block_size)
+        first, width = self.first // _SMALLER, -(-self.count // _SMALLER)
+        count = usable_range(width, first, left.shape[1], self.options.block_size)
         if count < NARROWEST:
             return None
-        disparity = match_views(views, first, count, options.for_smaller(_SMALLER))
+        disparity = match_views(views, first, count, self.options.for_smaller(_SMALLER))
         if self.blank is not None:
             size = left.shape[1], left.shape[0]
             disparity[cv2.resize(self.blank.view(np.uint8), size, interpolation=cv2.INTER_AREA) != 0] = 0
@@ -130,7 +120,7 @@ class Levelled:
     @cached_property
     def plane(self) -> Plane | None:
         """The road's; None where there is none, or nothing finds it."""
-        if self.find_road is None or self.search.first < 0 or self._small is None:
+        if self.find_road is None or self._small is None:
             return None
         found = self.find_road(self._small)
         return None if found is None else _resized(found, self._small.shape, self.shape)
@@ -153,8 +143,8 @@ class Levelled:
 
     @property
     def _wants_road(self) -> bool:
-        whole = self.find_road is None or self.search.first < 0
-        return not whole and self.search.options.is_default and self.shape[0] >= _LEAST_HEIGHT
+        wanted = self.find_road is not None and self.options.is_default
+        return wanted and self.shape[0] >= _LEAST_HEIGHT
 
     @cached_property
     def road(self) -> "_Near | None":
@@ -165,6 +155,36 @@ class Levelled:
     def lacks_road(self) -> bool:
         """Whether the road was to be matched along its plane, and too little of any was found."""
         return self._wants_road and self.road is None
+
+    def matched(self, *, whole: bool = False) -> Map:
+        """Match what an estimate needs: the road, and what lies beside and above it at a part of the size.
+
+        Parameters
+        ----------
+        whole : bool
+            Whether what lies beside and above the road is matched at full size, too.
+
+        Returns
+        -------
+        ndarray of float32, shape (H, W)
+            Pixels; no data is 0, and so is what the left view does not show.
+        """
+        first, count, options, near = self.first, self.count, self.options, self.road
+        if whole or self.plane is None:
+            disparity = without_lag(match_views(self.whole, first, count, options), options.mode)
+            if near is not None:
+                np.copyto(disparity[self.top :], near.disparity, where=near.lies_on & (near.disparity > 0))
+        else:
+            disparity = self.coarse.copy()
+            rows = disparity[self.top :]
+            if near is None:
+                rows[:] = match_below(self.whole, first, count, options, self.top)
+                disparity = without_lag(disparity, options.mode)
+            else:
+                np.copyto(rows, near.disparity, where=near.lies_on | (rows <= 0))
+        if self.blank is not None:
+            disparity[self.blank] = 0
+        return disparity
 
     def along(self, plane: Map, middle: int, rows: slice) -> Views:
         """Return some rows of both views, the right one warped so that a plane lies at a disparity `middle`.
@@ -177,43 +197,6 @@ class Levelled:
         v = np.arange(self.shape[0], dtype=np.float32)[rows, None]
         u, v = seen_at(self.lies, u, v, self.shape, plane)
         return smoothed_at_pixels(left[rows]), grey_along(right, u, np.broadcast_to(v, u.shape))
-
-
-def match_for_road(pair: Levelled, *, whole: bool = False) -> Map:
-    """Match what an estimate needs, see `_match`; what the left view does not show is no data."""
-    disparity = _match(pair, whole=whole)
-    if pair.blank is not None:
-        disparity[pair.blank] = 0
-    return disparity
-
-
-def _match(pair: Levelled, *, whole: bool) -> Map:
-    """Match what an estimate needs: the road, and what lies beside and above it at a part of the size.
-
-    Parameters
-    ----------
-    pair : Levelled
-    whole : bool
-        Whether what lies beside and above the road is matched at full size, too.
-
-    Returns
-    -------
-    ndarray of float32, shape (H, W)
-        Pixels; no data is 0.
-    """
-    first, count, options = pair.search
-    if whole or pair.plane is None:
-        disparity = without_lag(match_views(pair.whole, first, count, options), options.mode)
-        if (near := pair.road) is not None:
-            np.copyto(disparity[pair.top :], near.disparity, where=near.lies_on & (near.disparity > 0))
-        return disparity
-    disparity = pair.coarse.copy()
-    rows = disparity[pair.top :]
-    if (near := pair.road) is None:
-        rows[:] = match_below(pair.whole, first, count, options, pair.top)
-        return without_lag(disparity, options.mode)
-    np.copyto(rows, near.disparity, where=near.lies_on | (rows <= 0))
-    return disparity
 
 
 def _resized(plane: Plane, shape: tuple[int, ...], to: tuple[int, ...]) -> Plane:

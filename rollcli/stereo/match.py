@@ -2,7 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import Any
 
 import cv2
 import numpy as np
@@ -19,7 +20,7 @@ from rollcli.stereo.alignment import (
     level,
     textured_share,
 )
-from rollcli.stereo.along_road import FindRoad, Levelled, Search, match_for_road
+from rollcli.stereo.along_road import FindRoad, Levelled
 from rollcli.stereo.first_look import FirstLook, first_look, look_for_range
 from rollcli.stereo.misalignment import LEVEL, NOTHING_KNOWN, ColumnSupport, Misalignment
 from rollcli.stereo.options import StereoOptions as StereoOptions
@@ -104,25 +105,6 @@ PITCH_NOT_TOLD = "the rows do not tell whether the right camera is pitched or it
 CONTRADICTS = "the views do not lie as the correction says"
 
 
-class Wanted(NamedTuple):
-    """What of a map is wanted: by default all of it, at full size.
-
-    Attributes
-    ----------
-    road : callable or None
-        Finds the road's plane in a small map of the pair. The road is then matched along it, and what lies
-        beside and above it at a third of the size.
-    whole : bool
-        Whether a map with all of it at full size is wanted beside that, to be looked at.
-    """
-
-    road: FindRoad | None = None
-    whole: bool = False
-
-
-_EVERYTHING = Wanted()
-
-
 @dataclass(frozen=True)
 class StereoMatch:
     """A disparity map, the range it was searched in, and how the right view lay.
@@ -131,8 +113,6 @@ class StereoMatch:
     ----------
     disparity : ndarray of float32, shape (H, W)
         Pixels of the size matched at; no data is 0.
-    whole : ndarray of float32, shape (H, W), or None
-        The same with all of it at full size, if that was wanted and is another one.
     min_disparity, num_disparities : int
         The range searched.
     end_fraction : float
@@ -150,10 +130,11 @@ class StereoMatch:
         nothing was measured and corrected.
     doubt : str
         Why the views may not be level now; empty if there is no reason.
+    match_whole : callable
+        Makes `whole`.
     """
 
     disparity: Map
-    whole: Map | None
     min_disparity: int
     num_disparities: int
     end_fraction: float
@@ -162,6 +143,12 @@ class StereoMatch:
     lacks_road: bool
     slope_error: float
     doubt: str
+    match_whole: Callable[[], Map]
+
+    @cached_property
+    def whole(self) -> Map:
+        """The map with all of it at full size, to be looked at; matched when it is first asked for."""
+        return self.match_whole()
 
     @property
     def lies(self) -> Misalignment | None:
@@ -239,12 +226,11 @@ def compute_disparity(
         align,
         vertical_offset,
     )
-    match = match_pair(left, right, options, Wanted(road=road_plane, whole=True))
-    return match.disparity if match.whole is None else match.whole
+    return match_pair(left, right, options, road_plane).whole
 
 
 def match_pair(
-    left: NDArray[Any], right: NDArray[Any], options: StereoOptions, wanted: Wanted = _EVERYTHING
+    left: NDArray[Any], right: NDArray[Any], options: StereoOptions, find_road: FindRoad | None = None
 ) -> StereoMatch:
     """Match a rectified pair, and keep all that was found on the way.
 
@@ -252,8 +238,9 @@ def match_pair(
     ----------
     left, right, options
         See `compute_disparity`.
-    wanted : Wanted
-        What of the map is wanted.
+    find_road : callable, optional
+        Finds the road's plane in a small map of the pair. The road is then matched along it, and what lies
+        beside and above it at a third of the size; without it all is matched at full size.
 
     Raises
     ------
@@ -275,14 +262,13 @@ def match_pair(
         count = (width // 8 if look.range is None else look.range) - first
     count = usable_range(count, first, width, options.block_size)
 
-    search, blank = Search(first, count, options), shows_nothing(views[0])
-
+    blank, find_road = shows_nothing(views[0]), find_road if first >= 0 else None
     pair: Levelled
 
     def match(lies: Misalignment) -> Map:
         nonlocal pair
-        pair = Levelled(views, lies, look.disparity, search, wanted.road, blank)
-        return match_for_road(pair)
+        pair = Levelled(views, lies, look.disparity, first, count, options, find_road, blank)
+        return pair.matched()
 
     support, doubt = None, ""
     if options.measures_alignment:
@@ -311,15 +297,12 @@ def match_pair(
     def finished(found: Map) -> Map:
         return _with_believed_columns(refined(found, views, corrected), corrected, support)
 
+    disparity = finished(matched)
     valid, at_end = cv2.countNonZero(matched), matched >= first + count - 2
     if pair.road is not None:  # what is matched along the road's plane, no range ends
         at_end[pair.top :] &= matched[pair.top :] != pair.road.disparity
-    whole = None
-    if wanted.whole and wanted != _EVERYTHING._replace(whole=True):
-        whole = finished(match_for_road(pair, whole=True))
     return StereoMatch(
-        disparity=finished(matched),
-        whole=whole,
+        disparity=disparity,
         min_disparity=first,
         num_disparities=count,
         end_fraction=np.count_nonzero(at_end) / valid if valid else 0.0,
@@ -328,6 +311,7 @@ def match_pair(
         lacks_road=pair.lacks_road,
         slope_error=support.error,
         doubt=doubt,
+        match_whole=lambda: disparity if find_road is None else finished(pair.matched(whole=True)),
     )
 
 

@@ -104,7 +104,7 @@ class _Planes(NamedTuple):
         share = block_means(known.astype(np.float32))
         middle = block_means(disparity)
         middle /= np.maximum(share, np.float32(1e-3))
-        beside = _continued(middle)
+        beside = np.pad(middle, 1, mode="reflect", reflect_type="odd")  # beyond, as straight on as within
         left, right, above, below = beside[1:-1, :-2], beside[1:-1, 2:], beside[:-2, 1:-1], beside[2:, 1:-1]
         apart = np.float32(2 * BLOCK)
         across, down = (right - left) / apart, (below - above) / apart
@@ -139,15 +139,9 @@ def _found(
     return shift
 
 
-def _continued(blocks: Floats) -> Floats:
-    """Return values of blocks with one more on each side, as straight on as they go there."""
-    wider: Floats = np.pad(blocks, 1, mode="reflect", reflect_type="odd")
-    return wider
-
-
 def _between(blocks: Floats) -> Floats:
     """Return values of blocks at every pixel, interpolated between their middles."""
-    wider = _continued(blocks)
+    wider = np.pad(blocks, 1, mode="reflect", reflect_type="odd")
     size = wider.shape[1] * BLOCK, wider.shape[0] * BLOCK
     smooth = cv2.resize(wider, size, interpolation=cv2.INTER_LINEAR)[BLOCK:-BLOCK, BLOCK:-BLOCK]
     return smooth.astype(np.float32, copy=False)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from rollcli.estimator.request import DEFAULT_REQUEST
-from rollcli.run.read import wanted_of
+from rollcli.run.read import road_finder
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
@@ -52,7 +52,7 @@ def match_as_estimated(
     left: NDArray[Any], right: NDArray[Any], options: StereoOptions | None = None
 ) -> StereoMatch:
     """Match a pair as `rollcli estimate` does: rows above the road at a part of the size."""
-    return match_pair(left, right, options or StereoOptions(), wanted_of(None, DEFAULT_REQUEST))
+    return match_pair(left, right, options or StereoOptions(), road_finder(None, DEFAULT_REQUEST))
 
 
 def _matched(spec: FrameSpec, mode: str) -> Matched:

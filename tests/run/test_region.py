@@ -8,7 +8,7 @@ import pytest
 from rollcli.estimator.moments import usable_of
 from rollcli.estimator.request import Request
 from rollcli.run.options import FrameOptions, RegionOptions
-from rollcli.run.read import region_mask, wanted_of
+from rollcli.run.read import region_mask, road_finder
 from tests.run_cli import rollcli, write_kitti, write_maps
 
 SHAPE = (120, 160)
@@ -41,14 +41,14 @@ def test_a_slanted_side_that_reaches_far_keeps_its_place(far):
 
 def test_of_a_pair_the_road_is_found_in_the_region():
     options = FrameOptions(region=RegionOptions(roi=(81, 30, 160, 100)))
-    wanted = wanted_of(region_mask(None, options, SHAPE), Request())
+    find_road = road_finder(region_mask(None, options, SHAPE), Request())
     v, u = np.mgrid[:60, :80]
     left, right = 10 + 0.5 * v - 0.1 * u, 12 + 0.4 * v + 0.05 * u
     small = np.where(u < 41, left, right)
-    assert wanted.road(small) == pytest.approx((12, 0.05, 0.4), abs=1e-3)
+    assert find_road(small) == pytest.approx((12, 0.05, 0.4), abs=1e-3)
     small[v < 15] = small[v >= 50] = 0  # nothing in the region is no data
-    assert wanted.road(small) == pytest.approx((12, 0.05, 0.4), abs=1e-3)
-    assert wanted.road(np.where(u < 41, left, 0)) is None
+    assert find_road(small) == pytest.approx((12, 0.05, 0.4), abs=1e-3)
+    assert find_road(np.where(u < 41, left, 0)) is None
 
 
 def test_masks_in_an_archive_are_those_of_a_folder(tmp_path):

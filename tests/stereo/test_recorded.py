@@ -13,7 +13,7 @@ from rollcli.errors import RollcliError
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
 from rollcli.stereo.alignment import level, seen_from_right
-from rollcli.stereo.match import StereoOptions, Wanted, match_pair
+from rollcli.stereo.match import StereoOptions, match_pair
 from rollcli.stereo.misalignment import Misalignment
 from rollcli.stereo.row_fit import ColumnEvidence, column_support
 from tests.odd_views import find_road, seen_by
@@ -37,10 +37,10 @@ def _texture(disparity=14.0, slope=0.0):
     return wide[:, columns], np.stack([row[columns + shift] for row, shift in zip(wide, shifts, strict=True)])
 
 
-def _match(views, odd=None, wanted=None, **options):
+def _match(views, odd=None, road=None, *, whole=False, **options):
     left, right = views()
     try:
-        found = match_pair(left, seen_by(right, **(odd or {})), StereoOptions(**options), wanted or Wanted())
+        found = match_pair(left, seen_by(right, **(odd or {})), StereoOptions(**options), road)
     except RollcliError as error:
         return str(error)
     disparity, measured = found.disparity[found.disparity > 0], found.measured
@@ -52,7 +52,7 @@ def _match(views, odd=None, wanted=None, **options):
         "quartiles": np.percentile(disparity, (25, 50, 75)).tolist(),
         "mean": float(disparity.mean()),
         "valid in rows": [float((rows > 0).mean()) for rows in np.array_split(found.disparity, 8)],
-        "whole": None if found.whole is None else float((found.whole > 0).mean()),
+        "whole": None if not whole else float((found.whole > 0).mean()),
         # px: how far each part moves a corner
         "corrected": found.corrected.shifts(*shape),
         "lies": found.lies and found.lies.shifts(*shape),
@@ -128,12 +128,12 @@ CASES = {
     ),
     "corrected otherwise": partial(_corrected, {"lower": -3.0}),
     "given": partial(_match, _scene, {"lower": 2.0}, vertical_offset=2.0),
-    "along the road": partial(_match, _scene, None, Wanted(road=find_road)),
-    "along a road of full size": partial(_match, FULL, None, Wanted(road=find_road)),
-    "along a road in a high view": partial(_match, HIGH, ODD, Wanted(road=find_road)),
-    "a high view, whole": partial(_match, HIGH, ODD, Wanted(find_road, whole=True)),
-    "full size, whole": partial(_match, FULL, ODD, Wanted(find_road, whole=True)),
-    "whole": partial(_match, _scene, None, Wanted(find_road, whole=True)),
+    "along the road": partial(_match, _scene, None, find_road),
+    "along a road of full size": partial(_match, FULL, None, find_road),
+    "along a road in a high view": partial(_match, HIGH, ODD, find_road),
+    "a high view, whole": partial(_match, HIGH, ODD, find_road, whole=True),
+    "full size, whole": partial(_match, FULL, ODD, find_road, whole=True),
+    "whole": partial(_match, _scene, None, find_road, whole=True),
     "smaller": partial(_match, _scene, None, downscale=1.5),
     "five ways": partial(_match, _scene, None, mode="sgbm", num_disparities=48, block_size=7),
     "eight ways": partial(_match, _scene, None, mode="hh", speckle_size=0, uniqueness=2),
