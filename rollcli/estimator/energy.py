@@ -31,19 +31,19 @@ _SINGULAR = 1e-10  # a variance below this share of its square scale is rounding
 
 
 class Terms(NamedTuple):
-    """The energy at one angle, or at many: each entry a float, or an array shaped like the angles.
+    """The energy at an angle.
 
     Attributes
     ----------
-    value : float or ndarray
+    value : float
         E_min(theta), the weighted sum of squared residuals, px^2.
-    gradient, curvature : float or ndarray
+    gradient, curvature : float
         Its first and second derivative with respect to theta, px^2/rad and px^2/rad^2.
     """
 
-    value: Any
-    gradient: Any
-    curvature: Any
+    value: float
+    gradient: float
+    curvature: float
 
 
 @dataclass(frozen=True)
@@ -127,24 +127,9 @@ class Energy:
         _, c1, c2 = self.plane
         return float(c1 * c1 * xx + 2 * c1 * c2 * xy + c2 * c2 * yy)
 
-    @property
-    def normaliser(self) -> float:
-        """Factor to half the mean squared residual of d / max(d), the unit in which lambda(0) = 26 holds."""
-        return 1 / (2 * self.weight * self.peak**2)
-
-    def at(self, theta: Any) -> Terms:
-        """Evaluate energy, gradient and curvature.
-
-        Parameters
-        ----------
-        theta : float or ndarray
-            Radians.
-
-        Returns
-        -------
-        Terms
-        """
-        rotated = self._rotated(theta)
+    def at(self, theta: float) -> Terms:
+        """Evaluate energy, gradient and curvature at an angle, radians."""
+        rotated = self._in_frame(math.cos(theta), math.sin(theta))
         xx, xy, yy, xxx, xxy, xyy, yyy, xxyy, xyyy, yyyy, rxx, rxy, ryy, cx, cy = rotated
         n = self.weight
         skew, mean = yyy / yy, yy / n  # phi = y^2 - skew y - mean is orthogonal to 1 and y
@@ -190,7 +175,8 @@ class Energy:
         EstimationError
             When y takes only two values, so that the normal equations are singular.
         """
-        _, xy, yy, _, _, xyy, yyy, _, _, yyyy, _, _, ryy, cx, cy = self._rotated(theta)
+        rotated = self._in_frame(math.cos(theta), math.sin(theta))
+        _, xy, yy, _, _, xyy, yyy, _, _, yyyy, _, _, ryy, cx, cy = rotated
         skew, mean = yyy / yy, yy / self.weight
         per_phi = self._inverse(yyyy - yyy * skew - yy * mean, yyyy)
         if self.parabolic and not per_phi > 0:
@@ -200,35 +186,26 @@ class Energy:
         bend = b2 / self.grid.scale**2
         level = self.plane[0] - mean * b2
         y = self.grid.centre_v * math.cos(theta) - self.grid.centre_u * math.sin(theta)
-        a0, a1, a2 = level - slope * y + bend * y * y, slope - 2 * bend * y, bend
-        return float(a0), float(a1), float(a2)
+        return level - slope * y + bend * y * y, slope - 2 * bend * y, bend
 
     def rmse(self, value: float) -> float:
         """Root of the mean squared residual, px, where E_min has this value."""
         return math.sqrt(max(0.0, value) / self.weight)
 
-    def _rotated(self, theta: Any) -> list[Any]:
-        """Return the moments in the frame rotated by theta, then the plane's slopes along x and y."""
-        if isinstance(theta, float):
-            return self._in_frame(math.cos(theta), math.sin(theta))  # NumPy is slow on single numbers
-        return self._in_frame(np.cos(theta), np.sin(theta))
-
     def _in_frame(self, c: Any, s: Any) -> list[Any]:
-        """Return the same for the frame x = c p + s q, y = c q - s p."""
+        """Return the moments in the frame x = c p + s q, y = c q - s p, then the plane's slopes along x, y.
+
+        Each a number, for NumPy is slow on single ones, or an array shaped like c and s.
+        """
         cc, cs, ss = c * c, c * s, s * s
         basis = [cc, cs, ss, cc * c, cc * s, c * ss, ss * s, cc * cc, cc * cs, cc * ss, cs * ss, ss * ss]
         rotated = self.forms.dot(basis)
         _, c1, c2 = self.plane
         return [*(rotated if rotated.ndim > 1 else rotated.tolist()), c1 * c + c2 * s, c2 * c - c1 * s]
 
-    def _inverse(self, norm: Any, scale: Any) -> Any:
+    def _inverse(self, norm: float, scale: float) -> float:
         """Return 1 / norm, or 0, which drops the square: for a line, or where y has two values only."""
-        if not self.parabolic:
-            return 0.0
-        if isinstance(norm, float):
-            return 1 / norm if norm > _SINGULAR * scale else 0.0
-        regular = norm > _SINGULAR * scale
-        return np.where(regular, 1 / np.where(regular, norm, 1), 0.0)
+        return 1 / norm if self.parabolic and norm > _SINGULAR * scale else 0.0
 
 
 def _monomials(degree: int) -> list[tuple[int, int]]:

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.estimator.least_squares import solve_normal
-from rollcli.estimator.moments import Floats, Grid, powers
+from rollcli.estimator.moments import Floats, Grid, powers, solve_normal
 from rollcli.estimator.road.model import Parabola, Reals, RoadModel
 from rollcli.estimator.road.surface import Surface
 from rollcli.estimator.tuning import IntervalTuning

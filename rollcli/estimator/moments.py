@@ -1,4 +1,6 @@
-"""A map that can be estimated, and the 22 sums that every solver works on, in one pass over its pixels.
+"""A map that can be estimated, the sums that every solver works on, and least squares of such sums.
+
+One pass over the pixels of a map makes 22 sums.
 
 `y^k` of the rotated frame is a binomial in `u` and `v`, so the energy of [GD] eq. 9 at ANY angle is a
 combination of ``sum w u^i v^j`` (i + j <= 4), ``sum w d u^i v^j`` (i + j <= 2) and ``sum w d^2``.
@@ -255,3 +257,28 @@ def to_powers_of_sum(offsets: Floats) -> Floats:
     """Return the matrices from powers of x to powers of x + offset, for each offset: shape (B, 5, 5)."""
     matrices: Floats = _CHOOSE * powers(offsets).T[:, _REST]
     return matrices
+
+
+_RIDGE = 1e-10  # of each diagonal element: a parameter that the pixels do not determine stays finite
+_LEAST = 1e-200  # of a diagonal element, by which a row of zeros can be divided
+
+
+def solve_normal(normal: Floats, pull: Floats) -> Floats:
+    """Solve normal equations.
+
+    Parameters
+    ----------
+    normal : ndarray, shape (..., N, N)
+        Where a parameter is missing, its row and column are 0.
+    pull : ndarray, shape (..., N)
+        The right-hand sides.
+
+    Returns
+    -------
+    ndarray, shape (..., N)
+        0 for what is missing.
+    """
+    ridge = np.eye(normal.shape[-1])
+    return np.asarray(
+        np.linalg.solve(normal * (1 + _RIDGE * ridge) + _LEAST * ridge, pull[..., None])[..., 0]
+    )

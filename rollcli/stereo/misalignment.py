@@ -100,7 +100,7 @@ class Misalignment:
     def values(self, height: int, width: int) -> tuple[float, float, float, float]:
         """Return the parts in the units of a result: px, degrees, per cent, and px in the corners."""
         twist = self.shifts(height, width)[3]
-        return self.offset, self.rotation_deg, 100 * self.scale, twist
+        return self.offset, math.degrees(self.rotation), 100 * self.scale, twist
 
     @staticmethod
     def of_values(values: Sequence[float], height: int, width: int) -> "Misalignment":
@@ -117,11 +117,6 @@ class Misalignment:
             [self.rotation, larger, y + self.offset - self.rotation * x - larger * y],
             [0.0, 0.0, 1.0],
         ]
-
-    @property
-    def rotation_deg(self) -> float:
-        """The rotation in degrees."""
-        return math.degrees(self.rotation)
 
 
 LEVEL = Misalignment()

@@ -1,7 +1,5 @@
 """OpenCV's semi-global block matching [Hirschmüller 2008], with one set of costs, and its lag on slopes."""
 
-from typing import NamedTuple
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -10,24 +8,9 @@ from rollcli.errors import InputError
 from rollcli.stereo.options import StereoOptions
 from rollcli.stereo.views import Map, Views
 
-
-class Lag(NamedTuple):
-    """The lag of one mode, most rise / (rise + half_at).
-
-    Attributes
-    ----------
-    most : float
-        Of a surface that rises ever more steeply, px.
-    half_at : float
-        The rise with half of that, px of disparity per row.
-    """
-
-    most: float
-    half_at: float
-
-
-# 0.1 px is 0.025 degrees of pitch at KITTI's size, and 0.045 at 640x480
-LAGS = {"3way": Lag(0.25, 0.22), "sgbm": Lag(0.50, 0.25)}
+# Of a mode, the most that it lags, px, on what rises ever more steeply, and the rise, px per row, with
+# half of that. 0.1 px is 0.025 degrees of pitch at KITTI's size, and 0.045 at 640x480
+LAGS = {"3way": (0.25, 0.22), "sgbm": (0.50, 0.25)}
 _REACH = 6  # rows above and below: SGBM's steps of 1/16 px are then a hundredth of a road's rise
 STEEPEST = 1.0  # px per px: more is an edge between two things
 _GRID_STEP = 4  # of the grid on which the rise is taken: the lag is smooth
@@ -49,15 +32,15 @@ def without_lag(disparity: NDArray[np.float32], mode: str) -> NDArray[np.float32
     ndarray of float32, shape (H, W)
     """
     height, width = disparity.shape
-    lag = LAGS.get(mode)
-    if lag is None or height <= 2 * _REACH:
+    if mode not in LAGS or height <= 2 * _REACH:
         return disparity
+    most, half_at = LAGS[mode]
     columns = disparity[:, ::_GRID_STEP]
     upper, lower = columns[: -2 * _REACH : _GRID_STEP], columns[2 * _REACH :: _GRID_STEP]
     rise = (lower - upper) / (2 * _REACH)
     known = ((upper > 0) & (lower > 0) & (np.abs(rise) < STEEPEST)).astype(np.float32)
     up = np.maximum(rise, 0)
-    lags = (lag.most * up / (up + lag.half_at)).astype(np.float32) * known
+    lags = (most * up / (up + half_at)).astype(np.float32) * known
     around = cv2.blur(known, (_AROUND, _AROUND))
     filled = np.where(known > 0, lags, cv2.blur(lags, (_AROUND, _AROUND)) / np.maximum(around, 1e-3))
     added = cv2.resize(filled, (width, height), interpolation=cv2.INTER_LINEAR)

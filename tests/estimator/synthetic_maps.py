@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import settings
 from hypothesis import strategies as st
 
-from rollcli.estimator.energy import Energy
+from rollcli.estimator.energy import Energy, Terms
 from rollcli.estimator.moments import map_moments
 
 ROADS = Path(__file__).resolve().parents[3] / "shared" / "roads"
@@ -81,3 +81,8 @@ def energy_of(disparity, **options):
 def degrees_apart(one, other):
     """How far two angles (radians) are apart, as rotations of rows."""
     return math.degrees(abs(math.remainder(one - other, math.pi)))
+
+
+def at_each(energy, thetas):
+    """The energy at many angles: each of its terms an array shaped like them."""
+    return Terms(*np.array([energy.at(theta) for theta in thetas.tolist()]).T)

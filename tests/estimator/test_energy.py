@@ -9,7 +9,14 @@ from hypothesis import strategies as st
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.solvers.exact import exact
-from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of, random_maps, repeatable
+from tests.estimator.synthetic_maps import (
+    at_each,
+    bent_road,
+    degrees_apart,
+    energy_of,
+    random_maps,
+    repeatable,
+)
 
 ANGLES = np.linspace(-math.pi / 2, math.pi / 2, 181)
 angles = st.floats(-math.pi / 2, math.pi / 2)
@@ -46,7 +53,7 @@ def test_energy_is_that_of_a_least_squares_fit(disparity, theta, parabolic):
 @given(random_maps(), angles, st.booleans())
 def test_gradient_and_curvature_agree_with_central_differences(disparity, theta, parabolic):
     energy = energy_of(disparity, parabolic=parabolic)
-    terms, everywhere = energy.at(theta), energy.at(ANGLES)
+    terms, everywhere = energy.at(theta), at_each(energy, ANGLES)
     slope = central(lambda t: energy.at(t).value, theta)
     bend = central(lambda t: energy.at(t).gradient, theta)
     assert terms.gradient == pytest.approx(slope, rel=1e-6, abs=1e-8 * np.abs(everywhere.gradient).max())

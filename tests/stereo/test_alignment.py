@@ -53,7 +53,7 @@ def test_what_a_camera_was_moved_by_is_found_and_taken_away(frame, clockwise_deg
 
     match = match_pair(frame.left, seen_by(frame.right, **odd), StereoOptions())
 
-    assert match.corrected.rotation_deg == pytest.approx(clockwise_deg, abs=0.03)
+    assert math.degrees(match.corrected.rotation) == pytest.approx(clockwise_deg, abs=0.03)
     assert 100 * match.corrected.scale == pytest.approx(larger_percent, abs=0.05)
     assert match.corrected.offset == pytest.approx(lower, abs=0.15)
     found = math.degrees(estimate_roll(match.disparity).theta)
@@ -370,7 +370,7 @@ def test_real_street_pairs_are_levelled_by_what_was_added(clockwise_deg, larger_
         match = match_pair(left, seen_by(right, **odd), StereoOptions())
 
         added = match.corrected - as_it_is.corrected
-        assert added.rotation_deg == pytest.approx(clockwise_deg, abs=0.03)
+        assert math.degrees(added.rotation) == pytest.approx(clockwise_deg, abs=0.03)
         assert added.offset == pytest.approx(lower, abs=0.1)
         found, before = estimate_roll(match.disparity), estimate_roll(as_it_is.disparity)
         if before.status == "ok":  # a suspect angle may be either of two planes

@@ -112,7 +112,7 @@ def test_a_right_view_that_is_out_of_place_is_levelled_on_the_way(street, road, 
     found = match_pair(street.left, moved, StereoOptions(), find_road)
 
     assert found.corrected.offset == pytest.approx(lower, abs=0.15)
-    assert found.corrected.rotation_deg == pytest.approx(clockwise_deg, abs=0.03)
+    assert math.degrees(found.corrected.rotation) == pytest.approx(clockwise_deg, abs=0.03)
     both = (found.disparity > 0) & (road.disparity > 0)
     assert both.sum() > 0.9 * (road.disparity > 0).sum()
     assert np.median(np.abs(found.disparity - road.disparity)[both]) < 0.1

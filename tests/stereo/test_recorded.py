@@ -150,7 +150,7 @@ CASES = {
         LIES.resized(0.5),
         LIES.times(2.0),
         LIES.shifts(100, 300),
-        LIES.rotation_deg,
+        math.degrees(LIES.rotation),
         LIES.matrix(100, 300),
         Misalignment.of_values((1.5, -0.5, 0.4, 2.0), 100, 300),
     ],

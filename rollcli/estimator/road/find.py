@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.least_squares import solve_normal
-from rollcli.estimator.moments import Floats, Singles
+from rollcli.estimator.moments import Floats, Singles, solve_normal
 from rollcli.estimator.request import DEFAULT_REQUEST, Request
 from rollcli.estimator.road.model import RoadModel
 from rollcli.estimator.road.sample import Sample, every, quantile, take_sample, values_at

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.least_squares import solve_normal
-from rollcli.estimator.moments import Floats, Grid, Singles, powers, strips
+from rollcli.estimator.moments import Floats, Grid, Singles, powers, solve_normal, strips
 from rollcli.estimator.request import Request
 from rollcli.estimator.road.find import HARDLY_A_PIXEL, Road, agreement
 from rollcli.estimator.road.model import Reals, RoadModel

@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.energy import SAME_EVERYWHERE, Energy
-from rollcli.estimator.least_squares import solve_normal
-from rollcli.estimator.moments import Floats, Grid, map_moments, require_pixels
+from rollcli.estimator.moments import Floats, Grid, map_moments, require_pixels, solve_normal
 from rollcli.estimator.request import DEFAULT_REQUEST, Request
 from rollcli.estimator.solvers.exact import exact
 from rollcli.estimator.solvers.solution import Solution, SolverStatus

@@ -86,7 +86,7 @@ def minima(energy: Energy) -> list[Minimum]:
     if not energy.parabolic:  # a quadratic in tan(theta) [TITS]; its minimum is the angle of the best plane
         _, c1, c2 = energy.plane
         theta = principal(math.atan2(-c1, c2))
-        return [Minimum(theta, float(energy.at(theta).value))]
+        return [Minimum(theta, energy.at(theta).value)]
     frame = _even_frame(energy)
     over, under = energy.as_quotient(*frame.dot(_CIRCLE))
     starts = zeros(derivative(over) * under - over * derivative(under))
@@ -195,6 +195,6 @@ def certify(
         if angle_between(solution.theta, meant) > max(10 * tolerance, _SAME_BASIN):
             replaced = solution.theta
             solution = replace(solution, theta=meant)
-    value = float(energy.at(solution.theta).value)
+    value = energy.at(solution.theta).value
     slack = 1e-9 * (energy.rest + energy.slope_energy)
     return CertifiedSolution(solution, value, found, value <= found[0].energy + slack, replaced)

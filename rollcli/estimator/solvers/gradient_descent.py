@@ -36,9 +36,12 @@ def gradient_descent(energy: Energy, request: Request = DEFAULT_REQUEST) -> Solu
     the energy curves downward. So E must fall (else the step is halved), lambda stays positive (else it is
     doubled), and a step is at most 20 degrees.
     """
-    unit, tolerance = energy.normaliser, request.tolerance
+    # half the mean squared residual of d / max(d) is the unit in which lambda(0) = 26 holds
+    unit, tolerance = 1 / (2 * energy.weight * energy.peak**2), request.tolerance
     theta, now = 0.0, energy.at(0.0)
-    rate = _first_rate(request, unit * now.curvature)
+    rate = LAMBDA0 if request.lambda0 == "auto" else request.lambda0
+    if request.lambda0 == "auto" and now.curvature > 0:
+        rate = 1 / (unit * now.curvature)
     noise = 1e-14 * (energy.rest + energy.slope_energy)
     for iteration in range(1, _MAX_ITERATIONS + 1):
         step = -rate * unit * now.gradient
@@ -60,10 +63,3 @@ def gradient_descent(energy: Energy, request: Request = DEFAULT_REQUEST) -> Solu
             rate = secant if secant > 0 else 2 * rate
         now = then
     return Solution(principal(theta), _MAX_ITERATIONS, SolverStatus.STEP_LIMIT)
-
-
-def _first_rate(request: Request, curvature: float) -> float:
-    """Return lambda(0), given the curvature of the normalised energy at the start."""
-    if request.lambda0 != "auto":
-        return float(request.lambda0)
-    return 1 / curvature if curvature > 0 else LAMBDA0

@@ -10,7 +10,14 @@ from hypothesis import strategies as st
 from rollcli.errors import EstimationError
 from rollcli.estimator.solvers.exact import certify, exact, minima, zeros
 from rollcli.estimator.solvers.solution import Solution
-from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of, random_maps, repeatable
+from tests.estimator.synthetic_maps import (
+    at_each,
+    bent_road,
+    degrees_apart,
+    energy_of,
+    random_maps,
+    repeatable,
+)
 
 STEP = math.pi / 2048
 DENSE = np.arange(2048) * STEP - math.pi / 2 + STEP
@@ -21,15 +28,15 @@ def dense_minima(energy):
 
     Closer scans show the rounding of E, where E hardly bends.
     """
-    values = energy.at(DENSE).value
+    values = at_each(energy, DENSE).value
     low = np.flatnonzero((values < np.roll(values, 1)) & (values <= np.roll(values, -1)))
     found = []
     for theta in DENSE[low]:
         for width in (STEP, STEP / 15):
             offsets = np.linspace(-width, width, 41)
-            values = energy.at(theta + offsets).value
+            values = at_each(energy, theta + offsets).value
             theta = theta + offsets[np.argmin(values)]
-        bend, slope, _ = np.polyfit(offsets, energy.at(theta + offsets).value, 2)
+        bend, slope, _ = np.polyfit(offsets, at_each(energy, theta + offsets).value, 2)
         theta -= slope / (2 * bend)
         found.append((theta, energy.at(theta).value))
     return sorted(found, key=lambda each: each[1])
@@ -44,7 +51,7 @@ def noise_map(seed, shape=(40, 60)):
 def test_no_angle_of_a_dense_scan_is_lower(disparity):
     energy = energy_of(disparity)
     scale = energy.rest + energy.slope_energy
-    assert minima(energy)[0].energy <= energy.at(DENSE).value.min() + 1e-12 * scale
+    assert minima(energy)[0].energy <= at_each(energy, DENSE).value.min() + 1e-12 * scale
 
 
 @repeatable
@@ -115,7 +122,7 @@ def test_the_line_model_gives_the_angle_of_the_best_plane(disparity):
     (_, c1, c2), *_ = np.linalg.lstsq(design, disparity[v, u], rcond=None)
     theta = exact(energy).theta
     assert degrees_apart(theta, math.atan2(-c1, c2)) < 1e-6
-    assert energy.at(theta).value <= energy.at(DENSE).value.min() * (1 + 1e-12)
+    assert energy.at(theta).value <= at_each(energy, DENSE).value.min() * (1 + 1e-12)
 
 
 @pytest.mark.parametrize("columns", [(3, 40), (3, 4), (0, 59)])
@@ -137,7 +144,7 @@ def test_pixels_in_a_narrow_strip_are_no_harder(seed, slope, offset):
     except EstimationError:
         return  # too short to hold more than a line
     scale = energy.rest + energy.slope_energy
-    assert minima(energy)[0].energy <= energy.at(DENSE).value.min() + 1e-7 * scale
+    assert minima(energy)[0].energy <= at_each(energy, DENSE).value.min() + 1e-7 * scale
 
 
 ENERGY = energy_of(np.random.default_rng(3).uniform(1, 9, (40, 60)))

@@ -14,7 +14,14 @@ from rollcli.estimator.solvers.golden_section import golden_section
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.estimator.solvers.solution import SolverStatus
 from rollcli.evaluate.experiments import Textbook
-from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of, random_maps, repeatable
+from tests.estimator.synthetic_maps import (
+    at_each,
+    bent_road,
+    degrees_apart,
+    energy_of,
+    random_maps,
+    repeatable,
+)
 
 
 @repeatable
@@ -41,7 +48,7 @@ def test_what_has_converged_is_flat(disparity):
     energy = energy_of(disparity)
     found = gradient_descent(energy, Request(tolerance=math.radians(1e-6)))
     assume(found.status.converged)
-    steepest = np.abs(energy.at(np.linspace(0, math.pi, 181)).gradient).max()
+    steepest = np.abs(at_each(energy, np.linspace(0, math.pi, 181)).gradient).max()
     assert abs(energy.at(found.theta).gradient) < 1e-4 * steepest
 
 
@@ -87,7 +94,7 @@ def test_where_rounding_hides_the_fall_it_is_stuck_beside_the_minimum_and_says_s
 class Curve:
     """An energy whose derivatives are written out, and the angles at which it was asked for."""
 
-    normaliser, rest, slope_energy = 1.0, 0.0, 0.0
+    weight, peak, rest, slope_energy = 0.5, 1.0, 0.0, 0.0
 
     def __init__(self, value, gradient, curvature):
         self.functions, self.asked = (value, gradient, curvature), []
