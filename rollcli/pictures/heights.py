@@ -277,22 +277,17 @@ class _Profile:
 
     def at(self, disparity: Singles) -> tuple[Singles, Singles]:
         """Return the rows, px from this one, where the road has these disparities, and its rise there."""
-        foot, rise = self._on_parabola(disparity)
-        if self.further is not None:
-            steps = np.minimum(disparity * np.float32(_PER_PX), np.float32(len(self.further) - 1))
-            foot += self.further.take(steps.astype(np.intp))
-        return foot, rise
-
-    def _on_parabola(self, disparity: Singles) -> tuple[Singles, Singles]:
         over = disparity - np.float32(self.disparity)
-        if not self.bend:
-            return over / np.float32(self.rise), np.full_like(over, self.rise)
-        # beyond the end the parabola is flatter than any road, which goes on straight
-        end = np.float32((_FLATTEST**2 - 1) * self.rise**2 / (4 * self.bend))
-        bent = np.maximum(over, end) if self.bend > 0 else np.minimum(over, end)
+        bent = over
+        if self.bend:  # beyond the end the parabola is flatter than any road, which goes on straight
+            end = np.float32((_FLATTEST**2 - 1) * self.rise**2 / (4 * self.bend))
+            bent = np.maximum(over, end) if self.bend > 0 else np.minimum(over, end)
         rise = np.sqrt(bent * np.float32(4 * self.bend) + np.float32(self.rise**2))
         foot = bent / ((rise + np.float32(self.rise)) * np.float32(0.5))
         foot += (over - bent) / rise
+        if self.further is not None:
+            steps = np.minimum(disparity * np.float32(_PER_PX), np.float32(len(self.further) - 1))
+            foot += self.further.take(steps.astype(np.intp))
         return foot, rise
 
 

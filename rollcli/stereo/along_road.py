@@ -127,9 +127,8 @@ class Levelled:
 
     @cached_property
     def top(self) -> int:
-        """The first row that the plane reaches, and some to spare; the height where there is no plane."""
-        if self.plane is None:
-            return self.shape[0]
+        """The first row that the plane reaches, where there is one, and some to spare."""
+        assert self.plane is not None
         at_origin, across, down = self.plane
         height, width = self.shape
         horizon = -(at_origin + max(0.0, across * (width - 1))) / down  # at the side where that is higher

@@ -166,12 +166,8 @@ def _look(
 ) -> SmallMatch | None:
     """Level, match and measure once; `before` knows how far to search."""
     levelled = views[0], level(views[1], at)
-    matched = None if before is None else _match_again(levelled, before.top)
-    if matched is None:
-        matched = _match_small(levelled)
-    if matched is None:
-        return None
-    return replace(matched, measured=measure_misalignment(texture, matched.disparity, at))
+    matched = (before and _match_again(levelled, before.top)) or _match_small(levelled)
+    return matched and replace(matched, measured=measure_misalignment(texture, matched.disparity, at))
 
 
 def _match_again(views: Views, top: float) -> SmallMatch | None:

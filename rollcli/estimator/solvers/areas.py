@@ -126,8 +126,9 @@ def tile_sums(disparity: NDArray[Any], usable: NDArray[np.bool_], side: int) -> 
     Parameters
     ----------
     disparity : ndarray, shape (H, W)
-        Real numbers, px; values <= 0, NaN and inf are no data and weigh nothing.
+        Real numbers, px.
     usable : ndarray of bool, shape (H, W)
+        The pixels that are valid and may be used; others weigh nothing.
     side : int
         Of a tile, px.
 
@@ -143,8 +144,7 @@ def tile_sums(disparity: NDArray[Any], usable: NDArray[np.bool_], side: int) -> 
     gram = np.empty((rows, columns, 4, 4))
     for row in range(rows):
         part = slice(row * side, (row + 1) * side)
-        block = disparity[part]
-        used = usable[part] & (block > 0) & (block < np.inf)
+        block, used = disparity[part], usable[part]
         terms = np.zeros((4, side, columns * side))
         terms[0, : len(block), :width] = used
         np.copyto(terms[3, : len(block), :width], block, where=used)

@@ -26,6 +26,7 @@ _SAME_BASIN = math.radians(0.01)  # a solver that converged ends far nearer to i
 _ANGLES: Floats = np.linspace(0, 2 * np.pi, SAMPLES, endpoint=False, dtype=np.float64)
 _CIRCLE = np.stack([np.cos(_ANGLES / 2), np.sin(_ANGLES / 2)])
 _ORDERS = np.fft.fftfreq(SAMPLES, 1 / SAMPLES) * (np.abs(np.fft.fftfreq(SAMPLES, 1 / SAMPLES)) <= DEGREE)
+# takes samples of a polynomial of degree `DEGREE` at most to those of its derivative
 _TO_DERIVATIVE = np.fft.ifft(1j * _ORDERS[:, None] * np.fft.fft(np.eye(SAMPLES), axis=0), axis=0).real.copy()
 _POLISH = 8
 
@@ -47,12 +48,6 @@ def zeros(samples: Floats) -> list[float]:
     near = roots[np.abs(np.log(np.maximum(np.abs(roots), 1e-300))) < 0.1]
     angles: list[float] = np.angle(near).tolist()
     return angles
-
-
-def derivative(samples: Floats) -> Floats:
-    """Return samples of the derivative of a polynomial of degree `DEGREE` at most."""
-    slopes: Floats = _TO_DERIVATIVE.dot(samples)
-    return slopes
 
 
 @dataclass(frozen=True)
@@ -89,7 +84,7 @@ def minima(energy: Energy) -> list[Minimum]:
         return [Minimum(theta, energy.at(theta).value)]
     frame = _even_frame(energy)
     over, under = energy.as_quotient(*frame.dot(_CIRCLE))
-    starts = zeros(derivative(over) * under - over * derivative(under))
+    starts = zeros(_TO_DERIVATIVE.dot(over) * under - over * _TO_DERIVATIVE.dot(under))
     found, same = _settled(energy, _thetas(frame, starts)), 1e-12 * (energy.rest + energy.slope_energy)
     if 2 * len(found) != len(starts):  # else there is a maximum between two minima
         coarse = [Minimum(theta, energy.at(theta).value) for theta in _thetas(frame, _ANGLES.tolist())]
