@@ -449,10 +449,6 @@ class SmallViews:
     def _texture(self) -> Texture:
         return Texture.of(self.views)
 
-    def swapped(self) -> "SmallViews":
-        """Return the views with left and right exchanged."""
-        return SmallViews((self.views[1], self.views[0]))
-
     def measure(
         self, disparity: Map, start: Misalignment, rounds: int = 2, every: int = 1
     ) -> Measured | None:

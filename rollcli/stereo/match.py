@@ -60,7 +60,7 @@ def check_same_scene(small: SmallViews, look: FirstLook, measured: Measured | No
         return
     if np.array_equal(*small.views):
         raise InputError("the left and the right image are the same")
-    if _share(first_look(small.swapped()).measured) >= _PLAIN * textured:
+    if _share(first_look(SmallViews(small.views[::-1])).measured) >= _PLAIN * textured:
         raise InputError(
             "the views seem swapped: the scene is matched when the right image is taken for the left one"
         )

@@ -23,7 +23,7 @@ def refusal(monkeypatch, *, textured=(1.0, 1.0), before=0.0, after=0.0, swapped=
     shares = iter(textured)
     monkeypatch.setattr(match, "textured_share", lambda _: next(shares))
     monkeypatch.setattr(match, "first_look", lambda _: FirstLook(9, says(swapped)))
-    small = SimpleNamespace(views=views, swapped=lambda: None)
+    small = SimpleNamespace(views=views)
     try:
         match.check_same_scene(small, FirstLook(9, says(before)), says(after))
     except InputError as error:
