@@ -20,7 +20,7 @@ from rollcli.files.matching import stem_of
 from rollcli.files.naming import listed
 from rollcli.files.results import Result, Row, csv_table, read_result, run_path
 from rollcli.files.search import Search
-from rollcli.files.stream import is_stream, write_output
+from rollcli.files.storage import is_stream, write_output
 from rollcli.messages import say
 from rollcli.run.outputs import listed_only
 from rollcli.run.resume import recorded_options

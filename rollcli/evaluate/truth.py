@@ -10,7 +10,8 @@ from pathlib import Path
 from rollcli.errors import InputError, UsageError
 from rollcli.files.bounded import as_utf8
 from rollcli.files.matching import stem_of
-from rollcli.files.results import TEXT, read_named
+from rollcli.files.results import TEXT
+from rollcli.files.storage import read_named
 
 _NEEDED = ("file", "roll_deg")
 

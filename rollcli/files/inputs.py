@@ -4,17 +4,16 @@ import codecs
 import functools
 import os
 import re
-import sys
 from array import array
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from rollcli.errors import UsageError, as_usage, reading
-from rollcli.files.bounded import MOST_LISTED, as_utf8, read_given, read_stream
+from rollcli.files.bounded import MOST_LISTED, as_utf8
 from rollcli.files.containers import file_of, shown
 from rollcli.files.naming import Input, listed, match_names, natural_key
 from rollcli.files.search import IMAGE_ENDINGS, LEAVE_NONE, Search
-from rollcli.files.storage import read_bytes
+from rollcli.files.storage import STREAM, read_named
 from rollcli.files.stores.locations import base_name, is_url, public_name
 
 _NO_TEXT = (  # what images and archives begin with
@@ -167,8 +166,8 @@ def _place(each: Input) -> Path:
 def _arguments(inputs: Iterable[str], files_from: str | None) -> Iterator[tuple[str, bool]]:
     """Yield each argument, and whether it is literal: lists are, the command line may hold patterns."""
     for argument in inputs:
-        if argument == "-":
-            yield from ((line, True) for line in _listed_in("-"))
+        if argument == STREAM:
+            yield from ((line, True) for line in _listed_in(STREAM))
         else:
             yield argument, False
     if files_from is not None:
@@ -177,19 +176,13 @@ def _arguments(inputs: Iterable[str], files_from: str | None) -> Iterator[tuple[
 
 def _listed_in(name: str) -> Iterator[str]:
     """Yield the paths of a list: of a file, an object, or stdin ("-")."""
-    if name != "-":
-        read = read_bytes if is_url(name) else read_given
-        with as_usage(), reading(name, _LIST):
-            data = as_utf8(read(name, most=MOST_LISTED), name)
-    elif sys.stdin is None:
-        raise UsageError("-: stdin is closed; nothing can be read from it")
-    else:
-        data = as_utf8(read_stream(sys.stdin.buffer, "-", MOST_LISTED), "-")
-        if data.startswith(_NO_TEXT):
-            raise UsageError(
-                "-: stands for a list of files on stdin, one a line; what came is an image or an archive: "
-                "name its file in place of -"
-            )
+    with as_usage():
+        data = as_utf8(read_named(name, MOST_LISTED, _LIST), name)
+    if name == STREAM and data.startswith(_NO_TEXT):
+        raise UsageError(
+            "-: stands for a list of files on stdin, one a line; what came is an image or an archive: name "
+            "its file in place of -"
+        )
     return _lines(data)
 
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.files.results import READERS, STATUSES, STDIN, cells_of, pieces_of, read_run, value_of
+from rollcli.files.results import READERS, STATUSES, cells_of, pieces_of, read_run, value_of
+from rollcli.files.storage import STREAM
 
 _EMPTY = frozenset({"", None})
 _CHUNK = 300  # rows that are held as text: twenty thousand do not fit into a cache, and take a third longer
@@ -81,7 +82,7 @@ def read_columns(path: str, wanted: Sequence[str]) -> ResultColumns:
         np.array(status),
         {name: np.concatenate(column) for name, column in numbers.items()},
         frozenset(methods),
-        None if path == STDIN else read_run(path),
+        None if path == STREAM else read_run(path),
     )
 
 

@@ -6,7 +6,6 @@ import json
 import math
 import os
 import re
-import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
@@ -14,10 +13,10 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, Literal, get_args, get_type_hints
 
-from rollcli.errors import InputError, UsageError, reading
+from rollcli.errors import InputError, UsageError
 from rollcli.extras import require_extra
-from rollcli.files.bounded import as_utf8, read_given, read_stream
-from rollcli.files.storage import list_names, read_bytes
+from rollcli.files.bounded import as_utf8
+from rollcli.files.storage import STREAM, list_names, read_bytes, read_named
 from rollcli.files.stores.locations import is_url, is_web_url, public_name
 from rollcli.files.stores.objects import NO_OBJECT
 from rollcli.rig.quantities import BOUNDS
@@ -263,7 +262,6 @@ STATUSES = ("ok", "suspect", "error")
 # columns that a result has only where they say something: where fx and fy differ, and with --timing
 IMAGE_ROLL, TIMING = FURTHER = ("image_roll_deg", "elapsed_ms")
 COLUMNS = tuple(field.name for field in fields(Row) if field.name not in FURTHER)
-STDIN = "-"
 _MOST_SPACE = 1000  # bytes before what tells the format
 # how the right view of a pair lay against the left one
 ALIGNMENT_COLUMNS = ("right_lower_px", "right_clockwise_deg", "right_larger_percent", "right_twist_px")
@@ -387,7 +385,7 @@ def pieces_of(path: str) -> Iterator[tuple[str, bytes]]:
     InputError
         It cannot be read, or is larger than any result.
     """
-    parts = () if path == STDIN else part_names(list_names(path))
+    parts = () if path == STREAM else part_names(list_names(path))
     if parts:
         yield from read_parts(path, parts)
     else:
@@ -472,20 +470,6 @@ def read_run(path: str | Path) -> Mapping[str, Any] | None:
     if not isinstance(run, dict):
         raise InputError(f"{record}: is not the record of a run")
     return run
-
-
-def read_named(path: str | Path) -> bytes:
-    """Return the bytes of a file, a pipe, a URL or standard input ("-") that a user named.
-
-    Raises
-    ------
-    InputError
-        It cannot be read, or is larger than any result.
-    """
-    if is_url(str(path)):
-        return read_bytes(path)
-    with reading(path):
-        return read_stream(sys.stdin.buffer, STDIN) if str(path) == STDIN else read_given(path)
 
 
 _MOST = 1e40  # more than any float32 of a map; of what is larger squares cannot be summed

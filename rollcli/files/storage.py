@@ -1,4 +1,4 @@
-"""Bytes wherever they lie: on local disk, in an object store, or on a web server.
+"""Bytes wherever they lie: on local disk, in an object store, on a web server; and streams that take them.
 
 Import-light: obstore is loaded when the first URL of an object store is read or written.
 """
@@ -7,6 +7,8 @@ import contextlib
 import hashlib
 import os
 import stat
+import sys
+import uuid
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextvars import ContextVar
@@ -14,9 +16,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rollcli.errors import InputError, OutputError, reading
-from rollcli.files import bounded
-from rollcli.files.atomic import NameTakenError, in_threads, write_atomic, writing
+from rollcli.errors import InputError, OutputError, UsageError, reading
+from rollcli.files import atomic, bounded
 from rollcli.files.bounded import MOST_BYTES, too_large
 from rollcli.files.containers import file_of, read_member
 from rollcli.files.stores import objects
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 Beginning = Callable[[bytes, int, str], None] | None
 _HEAD = 2**16  # bytes: the header of an array
 _READ_ONLY = "web servers are read from, not written to"
+STREAM = "-"  # how the command line names standard input and output
+_STDOUT_NAME = "standard output"
 _AT_ONCE = 16  # requests, of 50 ms each: 10,000 small objects take half a minute
 
 
@@ -124,6 +127,27 @@ def read_frame(
     return data
 
 
+def read_named(location: str | Path, most: int = MOST_BYTES, subject: str = "") -> bytes:
+    """Return the bytes of a file, a pipe, a URL or standard input ("-") that a user named.
+
+    Errors of the system call it `subject`, where its name alone does not tell what it is.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or has more bytes than `most`.
+    """
+    name = str(location)
+    if is_url(name):
+        return read_bytes(name, most=most)
+    if name == STREAM and sys.stdin is None:
+        raise InputError(f"{name}: stdin is closed; nothing can be read from it")
+    with reading(name, subject):
+        if name == STREAM:
+            return bounded.read_stream(sys.stdin.buffer, name, most)
+        return bounded.read_given(name, most)
+
+
 def fetch_all(locations: Iterable[str], most: int = MOST_BYTES) -> dict[str, bytes]:
     """Read many small objects at once, each of so many bytes at most.
 
@@ -133,7 +157,7 @@ def fetch_all(locations: Iterable[str], most: int = MOST_BYTES) -> dict[str, byt
         One of them cannot be read.
     """
     every = list(locations)
-    return dict(zip(every, in_threads(partial(read_bytes, most=most), every, _AT_ONCE), strict=True))
+    return dict(zip(every, atomic.in_threads(partial(read_bytes, most=most), every, _AT_ONCE), strict=True))
 
 
 def _read_url(location: str, most: int) -> tuple[bytes, str]:
@@ -190,7 +214,7 @@ def write_bytes(location: str, data: bytes, *, durable: bool = False, owner: str
         It cannot be written.
     """
     if not is_url(location):
-        write_atomic(location, data, durable=durable)
+        atomic.write_atomic(location, data, durable=durable)
         return
     _require_writable(location)
     objects.write_object(location, data, owner)
@@ -223,14 +247,14 @@ def create(location: str, data: bytes, owner: str = "", *, durable: bool = True)
         _require_writable(location)
         return objects.create_object(location, data, owner or hashlib.sha256(data).hexdigest())
     try:
-        write_atomic(location, data, durable=durable, replaces=False)
-    except NameTakenError:
+        atomic.write_atomic(location, data, durable=durable, replaces=False)
+    except atomic.NameTakenError:
         there = _beginning_of(location, len(data))
         if there == data:  # by a worker that died before it could say so, perhaps
             return True
         if durable or there is None or not data.startswith(there.rstrip(b"\0")):
             return False
-        write_atomic(location, data)
+        atomic.write_atomic(location, data)
     return True
 
 
@@ -266,13 +290,13 @@ def remove(location: str) -> None:
         _require_writable(location)
         objects.remove_object(location)
         return
-    with writing(location):
+    with atomic.writing(location):
         Path(location).unlink(missing_ok=True)
 
 
 def remove_all(locations: Iterable[str]) -> None:
     """Remove many files or objects at once; see `remove`."""
-    in_threads(remove, list(locations), _AT_ONCE)
+    atomic.in_threads(remove, list(locations), _AT_ONCE)
 
 
 def _read_file(path: str, name: str, most: int = MOST_BYTES, begins: Beginning = None) -> bytes:
@@ -303,3 +327,84 @@ def _read_file(path: str, name: str, most: int = MOST_BYTES, begins: Beginning =
 def _require_writable(url: str) -> None:
     if scheme_of(url) in WEB_SERVERS:
         raise OutputError(f"{public_name(url)}: {_READ_ONLY}")
+
+
+def is_stream(name: str) -> bool:
+    """Tell whether a name is standard output, a device or a pipe, which no file can replace."""
+    mode = atomic.mode_of(name)
+    return name == STREAM or not (mode == 0 or stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
+def write_output(name: str, data: bytes, *, overwrite: bool) -> None:
+    """Write to standard output, into a device or pipe, or as a file or object that is whole or not there.
+
+    Parameters
+    ----------
+    name : str
+        A path, a URL of an object store, or "-".
+    data : bytes
+    overwrite : bool
+        Whether a file or object is replaced; otherwise it stays, also where another program has written it
+        since this one looked.
+
+    Raises
+    ------
+    UsageError
+        There is one, and it is not replaced.
+    OutputError
+        It cannot be written.
+    BrokenPipeError
+        The reader has closed its end.
+    """
+    if is_stream(name):
+        with open_stream(name) as write:
+            write(data)
+    else:
+        atomic.remove_leftovers([name])
+        if overwrite:
+            write_bytes(name, data)
+        elif not create(name, data, uuid.uuid4().hex):
+            raise UsageError(f"{name}: exists already; give --overwrite to replace it")
+
+
+@contextlib.contextmanager
+def open_stream(name: str) -> Iterator[Callable[[bytes], None]]:
+    """Open standard output, a device or a pipe; yield what writes all of some bytes to it.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written, or standard output is closed.
+    BrokenPipeError
+        The reader has closed its end.
+    """
+    if name == STREAM:
+        if sys.stdout is None:  # Python's word for a closed one; its number may be another file's by now
+            raise OutputError(f"{_STDOUT_NAME}: is closed")
+        yield partial(write_stream, 1, name=_STDOUT_NAME)
+        return
+    with atomic.writing(name):
+        descriptor = os.open(name, os.O_WRONLY)
+    try:
+        yield partial(write_stream, descriptor, name=name)
+    finally:
+        os.close(descriptor)
+
+
+def write_stream(descriptor: int, data: bytes, name: str) -> None:
+    """Write all of the data; errors call the stream `name`.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written.
+    BrokenPipeError
+        The reader has closed its end.
+    """
+    try:
+        while data:
+            data = data[os.write(descriptor, data) :]
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise atomic.output_error(name, error) from error

@@ -9,7 +9,7 @@ from rollcli.errors import ExitStatus, InputError, UsageError
 from rollcli.extras import require_extra
 from rollcli.files.naming import listed, natural_key
 from rollcli.files.results import Result, Row, read_result, run_path
-from rollcli.files.stream import is_stream, write_output
+from rollcli.files.storage import is_stream, write_output
 from rollcli.report.charts import all_charts
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import Chart

@@ -20,7 +20,6 @@ from rollcli.files.results import STATUSES
 from rollcli.files.storage import create, read_bytes, remove, remove_all, write_bytes
 from rollcli.files.stores.locations import is_object_url, is_url, located, public_name
 from rollcli.files.stores.objects import list_objects
-from rollcli.files.stream import STDOUT, open_stream
 from rollcli.run.frame import Frame
 from rollcli.run.options import ENDING_OF_FORMAT, ConvertOptions, ImageKind, ImageOptions, RunningOptions
 
@@ -303,7 +302,7 @@ def list_files(frames: Iterable[tuple[Iterable[str], Iterable[str]]]) -> None:
         for does, paths in (("read ", reads), ("write", writes))
         for path in paths
     )
-    with open_stream(STDOUT) as write:
+    with storage.open_stream(storage.STREAM) as write:
         while some := "".join(islice(lines, _LISTED_AT_ONCE)):
             write(some.encode("utf-8", "surrogateescape"))
 

@@ -8,8 +8,8 @@ from itertools import chain
 from rollcli.errors import UsageError
 from rollcli.files.containers import file_of
 from rollcli.files.results import IMAGE_ROLL, TIMING, Format, require_utf8, run_path
+from rollcli.files.storage import is_stream
 from rollcli.files.stores.locations import is_url, tasks_in_hand
-from rollcli.files.stream import is_stream
 from rollcli.rig.calibration import Calibration
 from rollcli.run import outputs
 from rollcli.run.find import Named, calibration_files, check_depth, check_first_size, map_frames, pair_frames

@@ -10,8 +10,8 @@ from rollcli.errors import InputError, UsageError
 from rollcli.files.atomic import is_there, remove_leftovers
 from rollcli.files.locking import exists_already, not_resumable
 from rollcli.files.results import format_header, parse_rows, run_path
+from rollcli.files.storage import is_stream, open_stream
 from rollcli.files.stores.locations import base_name
-from rollcli.files.stream import is_stream, open_stream
 from rollcli.run.batch import Batch
 from rollcli.run.frame import Frame
 from rollcli.run.outputs import local_images

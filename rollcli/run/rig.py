@@ -12,8 +12,8 @@ from rollcli.errors import InputError, UsageError
 from rollcli.files.naming import listed, natural_key
 from rollcli.files.result_columns import ResultColumns, read_columns
 from rollcli.files.results import STATUSES, Result, parse_rows, pieces_of, read_run, run_path
+from rollcli.files.storage import is_stream, write_output
 from rollcli.files.stores.locations import base_name, is_remote
-from rollcli.files.stream import is_stream, write_output
 from rollcli.messages import say
 from rollcli.rig.drive.assess import RigAssessment, RigFrames, assess_frames, difference, short_names
 from rollcli.rig.drive.posterior import Estimate

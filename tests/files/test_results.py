@@ -1,6 +1,7 @@
 """Rows to text and back, columns of a result, and which row belongs to which file."""
 
 import itertools
+import sys
 
 import numpy as np
 import pytest
@@ -33,6 +34,13 @@ HOSTILE = {
 def test_a_result_in_a_bucket_is_read_without_the_record_of_its_run(bucket):
     write_bytes(f"{bucket}/rolls.csv", b"file,status,roll_deg\na.png,ok,1\n")
     assert read_result(f"{bucket}/rolls.csv").run is None
+
+
+@pytest.mark.parametrize("read", [read_result, lambda path: read_columns(path, ["roll_deg"])])
+def test_a_result_from_a_closed_stdin_is_refused(monkeypatch, read):
+    monkeypatch.setattr(sys, "stdin", None)
+    with pytest.raises(InputError, match=r"^-: stdin is closed; nothing can be read from it$"):
+        read("-")
 
 
 @pytest.mark.parametrize("what", HOSTILE)

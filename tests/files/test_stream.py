@@ -9,7 +9,7 @@ import threading
 import pytest
 
 from rollcli.errors import OutputError
-from rollcli.files import stream
+from rollcli.files import storage
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
 
@@ -29,17 +29,17 @@ def test_a_pipe_gets_all_of_the_bytes_and_stays_a_pipe(tmp_path):
     os.mkfifo(path)
     reader = threading.Thread(target=lambda: found.append(path.read_bytes()))
     reader.start()
-    stream.write_output(str(path), data, overwrite=False)
+    storage.write_output(str(path), data, overwrite=False)
     reader.join(timeout=60)
     assert found == [data]
     assert path.is_fifo()
 
 
 def test_standard_output_is_descriptor_1_unless_python_calls_it_closed(monkeypatch):
-    with stream.open_stream("-") as write:
+    with storage.open_stream("-") as write:
         assert write.args == (1,)
     monkeypatch.setattr(sys, "stdout", None)
-    with pytest.raises(OutputError, match=r"^standard output: is closed$"), stream.open_stream("-"):
+    with pytest.raises(OutputError, match=r"^standard output: is closed$"), storage.open_stream("-"):
         pass
 
 
@@ -47,11 +47,11 @@ def test_a_reader_that_has_gone_is_told_from_an_error(pipe, monkeypatch):
     reads, writes = pipe
     os.close(reads)
     with pytest.raises(BrokenPipeError):
-        stream.write_stream(writes, b"data", "/dev/x")
+        storage.write_stream(writes, b"data", "/dev/x")
 
     def fail(descriptor, data):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, "write", fail)
     with pytest.raises(OutputError, match=r"^/dev/x: cannot be written: no space left on device$"):
-        stream.write_stream(writes, b"data", "/dev/x")
+        storage.write_stream(writes, b"data", "/dev/x")
