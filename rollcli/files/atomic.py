@@ -8,6 +8,7 @@ import re
 import stat
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
@@ -82,7 +83,9 @@ def sync_files(paths: Iterable[str | Path], named: set[Path] | None = None) -> N
         The disk fails to take one; it is named.
     """
     every = [Path(path) for path in paths]
-    in_threads(_sync_path, every)
+    # Windows forces only what is open for writing
+    flags = os.O_RDWR if _ON_WINDOWS else os.O_RDONLY
+    in_threads(partial(_sync, flags, (errno.ENOENT,)), every)
     sync_names(every, named)
 
 
@@ -97,7 +100,7 @@ def sync_names(paths: Iterable[Path], named: set[Path] | None = None) -> None:
             folders[folder] = None
             if folder in named or os.path.ismount(folder):  # Path.is_mount raises where looking fails
                 break
-    in_threads(_sync_folder, list(folders))
+    in_threads(partial(_sync, os.O_RDONLY, _NOT_FOR_FOLDERS), list(folders))
     named.update(folders)
 
 
@@ -116,26 +119,13 @@ def in_threads(do: Callable[[Thing], Done], things: Sequence[Thing], most: int =
         return list(map(do, things))
 
 
-def _sync_path(path: Path) -> None:
-    # Windows forces only what is open for writing
-    mode = "r+b" if _ON_WINDOWS else "rb"
-    with _forced(path), contextlib.suppress(FileNotFoundError), path.open(mode) as file:
-        os.fsync(file.fileno())
-
-
-def _sync_folder(folder: Path) -> None:
-    with _forced(folder, _NOT_FOR_FOLDERS):
-        descriptor = os.open(folder, os.O_RDONLY)
+def _sync(flags: int, harmless: Sequence[int], path: Path) -> None:
+    try:
+        descriptor = os.open(path, flags)
         try:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
-
-
-@contextlib.contextmanager
-def _forced(path: Path, harmless: Sequence[int] = ()) -> Iterator[None]:
-    try:
-        yield
     except OSError as error:
         if error.errno not in harmless:
             raise OutputError(f"{path}: cannot be forced to the disk: {cause_of(error)}") from error
