@@ -15,8 +15,10 @@ from rollcli.errors import InputError, UsageError
 from rollcli.estimator.moments import usable_of
 from rollcli.files.codecs import arrays, pictures, png, tiff
 from rollcli.files.codecs.raw_map import Stored as Stored
-from rollcli.files.codecs.raw_map import native, require_map_shape
+from rollcli.files.codecs.raw_map import require_map_shape
 from rollcli.files.storage import read_bytes, read_frame
+
+_GREY = (np.uint8, np.uint16)  # of camera images
 
 
 class MapFormat(NamedTuple):
@@ -37,30 +39,18 @@ class MapFormat(NamedTuple):
     encode: Callable[[NDArray[Any], tuple[float, ...], str], bytes]
 
 
-def _array_format(
-    name: str,
-    signatures: tuple[bytes, ...],
-    decode: Callable[[bytes, str], NDArray[Any]],
-    encode: Callable[[NDArray[Any]], bytes],
-) -> MapFormat:
-    """Return a format that holds numbers and nothing else."""
-    return MapFormat(
-        signatures,
-        lambda data, file: Stored(native(decode(data, file)), name),
-        lambda values, *_: encode(values),
-    )
-
-
 # a new format: a file in `codecs`, a line here, and its ending in `search`, which loads no decoder
 MAP_FORMATS = {
     "png": MapFormat((png.SIGNATURE,), png.decode_png, lambda values, _, text: png.encode_png(values, text)),
     "tiff": MapFormat(tiff.SIGNATURES, tiff.decode_tiff, tiff.encode_tiff),
-    "npy": _array_format("npy", (arrays.MAGIC,), arrays.decode_npy, arrays.encode_npy),
-    "pfm": _array_format("pfm", arrays.MAGICS, arrays.decode_pfm, arrays.encode_pfm),
-    "npz": _array_format("npz", (arrays.MAGIC_NPZ,), arrays.decode_npz, arrays.encode_npz),
-    "exr": _array_format("exr", (pictures.MAGIC_EXR,), pictures.decode_exr, pictures.encode_exr),
+    "npy": MapFormat((arrays.MAGIC,), arrays.decode_npy, lambda values, *_: arrays.encode_npy(values)),
+    "pfm": MapFormat(arrays.MAGICS, arrays.decode_pfm, lambda values, *_: arrays.encode_pfm(values)),
+    "npz": MapFormat((arrays.MAGIC_NPZ,), arrays.decode_npz, lambda values, *_: arrays.encode_npz(values)),
+    "exr": MapFormat(
+        (pictures.MAGIC_EXR,), pictures.decode_exr, lambda values, *_: pictures.encode_exr(values)
+    ),
     # told by --encoding alone: to all others such a PNG is a photograph
-    "rgb": _array_format("rgb", (), pictures.decode_rgb, pictures.encode_rgb),
+    "rgb": MapFormat((), pictures.decode_rgb, lambda values, *_: pictures.encode_rgb(values)),
 }
 
 
@@ -142,7 +132,7 @@ def read_image(path: str | Path, name: str | None = None) -> NDArray[Any]:
     data = read_frame(path, name)
     if isinstance(data, bytes):
         return decode_image(data, name)
-    if data.dtype not in (np.uint8, np.uint16):  # of a recording
+    if data.dtype not in _GREY:  # of a recording
         raise InputError(f"{name}: holds {data.dtype}; a camera image is uint8 or uint16")
     return data
 
@@ -157,11 +147,8 @@ def decode_image(data: bytes, name: str) -> NDArray[Any]:
     """
     if data.startswith(png.SIGNATURE):
         return png.picture(data, name)
-    if data.startswith(arrays.MAGIC) and (grey := arrays.decode_npy(data, name)).dtype in (
-        np.uint8,
-        np.uint16,
-    ):
-        return native(grey)
+    if data.startswith(arrays.MAGIC) and (grey := arrays.decode_npy(data, name).values).dtype in _GREY:
+        return grey
     if data.startswith(tiff.SIGNATURES):
         return tiff.picture(data, name)
     if data.startswith(pictures.SIGNATURES):

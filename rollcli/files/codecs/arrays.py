@@ -5,6 +5,7 @@ import math
 import re
 import zipfile
 import zlib
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,8 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError, OutputError
 from rollcli.files.bounded import most_unpacked
-from rollcli.files.codecs.raw_map import require_decoded_fits, require_map_shape, require_pixels
+from rollcli.files.codecs import raw_map
+from rollcli.files.codecs.raw_map import Stored, native
 
 MAGIC = b"\x93NUMPY"
 MAGIC_NPZ = b"PK\x03\x04"
@@ -28,14 +30,14 @@ _REAL = re.compile(r"[<>|=]?[biuf]\d+")
 _UNREAL = {"O": "Python objects (a pickle, which is never loaded)", "c": "complex numbers", "[": "records"}
 
 
-def decode_npy(data: bytes, name: str) -> NDArray[Any]:
+def decode_npy(data: bytes, name: str) -> Stored:
     """Return the array of an .npy file: real numbers or booleans, shape (H, W), any byte and axis order.
 
     (1, H, W) and (H, W, 1), as networks write them, are (H, W).
     """
     dtype, fortran, shape, start = check_npy(data, len(data), name)
     values = np.frombuffer(data, dtype, count=math.prod(shape), offset=start)
-    return values.reshape(shape, order="F" if fortran else "C")
+    return Stored(native(values.reshape(shape, order="F" if fortran else "C")), "npy")
 
 
 def check_npy(head: bytes, size: int, name: str) -> tuple[np.dtype[Any], bool, tuple[int, ...], int]:
@@ -48,13 +50,13 @@ def check_npy(head: bytes, size: int, name: str) -> tuple[np.dtype[Any], bool, t
     """
     dtype, fortran, shape, start = _header(head, name)
     shape = _without_single_axis(shape)
-    require_map_shape(shape, name)
+    raw_map.require_map_shape(shape, name)
     needed, there = math.prod(shape) * dtype.itemsize, size - start
     if there < needed:
         raise InputError(
             f"{name}: is truncated: shape {shape} of {dtype} needs {needed} bytes, {there} are there"
         )
-    require_decoded_fits(shape[1], shape[0], dtype.itemsize, size, name)
+    raw_map.require_decoded_fits(shape[1], shape[0], dtype.itemsize, size, name)
     return dtype, fortran, shape, start
 
 
@@ -72,7 +74,7 @@ def _without_single_axis(shape: tuple[int, ...]) -> tuple[int, ...]:
     return shape[:2] if len(shape) == 3 and shape[2] == 1 else shape
 
 
-def decode_npz(data: bytes, name: str) -> NDArray[Any]:
+def decode_npz(data: bytes, name: str) -> Stored:
     """Return the one array of an .npz file, or of several the one named disparity; see `decode_npy`."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -94,7 +96,7 @@ def decode_npz(data: bytes, name: str) -> NDArray[Any]:
         )
     if not array.startswith(MAGIC):
         raise InputError(f"{name}: is a ZIP archive whose {chosen.filename} is no array")
-    return decode_npy(array, name)
+    return replace(decode_npy(array, name), format="npz")
 
 
 def encode_npz(values: NDArray[Any]) -> bytes:
@@ -138,11 +140,11 @@ _FLOAT = rb"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?)"
 _HEADER = re.compile(rb"P([fF])" + 2 * (_GAP + rb"(\d{1,9})") + _GAP + _FLOAT + rb"[ \t]*\r?\n")
 
 
-def decode_pfm(data: bytes, name: str) -> NDArray[Any]:
+def decode_pfm(data: bytes, name: str) -> Stored:
     """Return the float32 values of a single-channel PFM file, top row first."""
     order, width, height, start = check_pfm(data, len(data), name)
     rows = np.frombuffer(data, order, count=width * height, offset=start).reshape(height, width)
-    return rows[::-1]  # PFM stores the bottom row first
+    return Stored(native(rows[::-1]), "pfm")  # PFM stores the bottom row first
 
 
 def check_pfm(data: bytes, size: int, name: str) -> tuple[str, int, int, int]:
@@ -159,8 +161,8 @@ def check_pfm(data: bytes, size: int, name: str) -> tuple[str, int, int, int]:
     if header[1] == b"F":
         raise InputError(f"{name}: is a colour PFM (PF); a disparity map has one channel (Pf)")
     width, height = int(header[2]), int(header[3])
-    require_pixels(width, height, name, 4 * width * height, size - header.end())
-    require_decoded_fits(width, height, 4, size, name)
+    raw_map.require_pixels(width, height, name, 4 * width * height, size - header.end())
+    raw_map.require_decoded_fits(width, height, 4, size, name)
     return "<f4" if header[4].startswith(b"-") else ">f4", width, height, header.end()
 
 

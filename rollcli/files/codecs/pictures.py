@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError, OutputError
 from rollcli.files.codecs import png
-from rollcli.files.codecs.png import decoding
-from rollcli.files.codecs.raw_map import PICTURE_FLAGS, require_decoded_fits
+from rollcli.files.codecs.png import decoded_by_opencv
+from rollcli.files.codecs.raw_map import PICTURE_FLAGS, Stored, native, require_decoded_fits
 
 _BMP = b"BM"
 LOSSLESS = (_BMP, b"P5", b"P6")
@@ -34,14 +34,10 @@ def decode_picture(data: bytes, name: str) -> NDArray[Any]:
         raise InputError(f"{name}: is an unusual BMP; those without compression are read")
     if not data.startswith(LOSSLESS):
         _require_whole_jpeg(data, name)
-    try:
-        with decoding() as printed:
-            pixels = cv2.imdecode(np.frombuffer(data, np.uint8), PICTURE_FLAGS)
-    except cv2.error:  # a size beyond OpenCV's limits
-        pixels = None
+    pixels, printed = decoded_by_opencv(data, PICTURE_FLAGS)
     if pixels is None:
         raise InputError(f"{name}: is a damaged or truncated image")
-    if complaint := _complaint(printed.text):
+    if complaint := _complaint(printed):
         raise InputError(f"{name}: is a damaged JPEG: {complaint}")
     return pixels
 
@@ -109,7 +105,7 @@ def views_of(image: NDArray[Any], layout: str, name: str) -> tuple[NDArray[Any],
     return np.ascontiguousarray(one), np.ascontiguousarray(other)
 
 
-def decode_rgb(data: bytes, name: str) -> NDArray[np.uint32]:
+def decode_rgb(data: bytes, name: str) -> Stored:
     """Return the whole numbers that FoundationStereo writes to the channels of an 8-bit PNG, shape (H, W).
 
     Raises
@@ -121,8 +117,7 @@ def decode_rgb(data: bytes, name: str) -> NDArray[np.uint32]:
     if pixels.ndim != 3 or pixels.dtype != np.uint8:
         raise InputError(f"{name}: is no RGB PNG of 8 bits, which --encoding foundationstereo reads")
     blue, green, red = (pixels[..., each].astype(np.uint32) for each in range(3))
-    numbers: NDArray[np.uint32] = (red * _BASE + green) * _BASE + blue
-    return numbers
+    return Stored((red * _BASE + green) * _BASE + blue, "rgb")
 
 
 def encode_rgb(values: NDArray[Any]) -> bytes:
@@ -139,7 +134,7 @@ def encode_rgb(values: NDArray[Any]) -> bytes:
     return bytes(cv2.imencode(".png", np.dstack(digits).astype(np.uint8))[1])
 
 
-def decode_exr(data: bytes, name: str) -> NDArray[Any]:
+def decode_exr(data: bytes, name: str) -> Stored:
     """Return the numbers of an OpenEXR file of one channel, where OpenCV was built to read it; shape (H, W).
 
     Raises
@@ -155,18 +150,14 @@ def decode_exr(data: bytes, name: str) -> NDArray[Any]:
         raise InputError(f"{name}: has no pixels")
     require_decoded_fits(right - left + 1, bottom - top + 1, 12, len(data), name)
     os.environ.setdefault("OPENCV_IO_ENABLE_OPENEXR", "1")  # OpenCV looks at it when it reads the first EXR
-    try:
-        with decoding():
-            pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    except cv2.error:
-        pixels = None
+    pixels, _ = decoded_by_opencv(data, cv2.IMREAD_UNCHANGED)
     if pixels is None:
         raise InputError(f"{name}: is damaged, or this OpenCV reads no EXR; save it as TIFF, float32")
     if pixels.ndim == 3 and (pixels == pixels[..., :1]).all():
         pixels = pixels[..., 0]
     if pixels.ndim != 2:
         raise InputError(f"{name}: is an EXR of {pixels.shape[2]} channels; a disparity map has one")
-    return pixels
+    return Stored(native(pixels), "exr")
 
 
 def encode_exr(values: NDArray[Any]) -> bytes:

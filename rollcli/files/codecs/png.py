@@ -26,19 +26,6 @@ _MOST = 4000  # bytes of it that are looked at
 _sink: int | None = None
 
 
-class Printed:
-    """What was printed while a file was decoded; known once that is over.
-
-    Attributes
-    ----------
-    text : str
-        Empty when nothing was printed, or when `silence_decoders` was not called.
-    """
-
-    def __init__(self) -> None:
-        self.text = ""
-
-
 def silence_decoders() -> None:
     """Let nothing that `decoding` surrounds reach the terminal, from now on.
 
@@ -54,9 +41,12 @@ def silence_decoders() -> None:
 
 
 @contextlib.contextmanager
-def decoding() -> Iterator[Printed]:
-    """Turn stderr, as C libraries know it, away for a moment; nothing at all where nobody asked for it."""
-    printed = Printed()
+def decoding() -> Iterator[list[str]]:
+    """Turn stderr, as C libraries know it, away for a moment; nothing at all where nobody asked for it.
+
+    Once that is over, the list holds what was printed; it stays empty when `silence_decoders` was not called.
+    """
+    printed = list[str]()
     try:
         terminal = None if _sink is None else os.dup(2)
     except OSError:  # stderr is closed: nothing can be printed
@@ -70,7 +60,7 @@ def decoding() -> Iterator[Printed]:
     finally:
         os.dup2(terminal, 2)
         os.close(terminal)
-        printed.text = _taken(_sink)
+        printed.append(_taken(_sink))
 
 
 def _taken(sink: int) -> str:
@@ -82,6 +72,14 @@ def _taken(sink: int) -> str:
     os.lseek(sink, 0, os.SEEK_SET)
     os.truncate(sink, 0)
     return text
+
+
+def decoded_by_opencv(data: bytes, flags: int) -> tuple[NDArray[Any] | None, str]:
+    """Return the pixels of a file, None where OpenCV refuses it; and what it or its libraries printed."""
+    pixels = None
+    with decoding() as printed, contextlib.suppress(cv2.error):  # a size beyond OpenCV's limits
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+    return pixels, "".join(printed)
 
 
 _SUB = 1
@@ -250,10 +248,8 @@ def _decoded(
         start.append(_chunk(b"PLTE", palette.ljust(3 * colours, b"\0")))
         if transparent := bodies.get(b"tRNS"):
             start.append(_chunk(b"tRNS", transparent[:colours]))
-    file = b"".join([*start, *image, _chunk(b"IEND", b"")])
-    with decoding() as printed:
-        pixels = cv2.imdecode(np.frombuffer(file, np.uint8), flags)
-    if pixels is None or "libpng" in printed.text:
+    pixels, printed = decoded_by_opencv(b"".join([*start, *image, _chunk(b"IEND", b"")]), flags)
+    if pixels is None or "libpng" in printed:
         raise InputError(f"{name}: is a damaged PNG: its pixel data are wrong")
     return header, bodies, pixels
 

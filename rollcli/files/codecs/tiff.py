@@ -163,19 +163,6 @@ _CHUNKY = 1
 _LARGE_TILE = 2**22  # pixels; a small image may lie in one large tile
 _NOT_A_PAGE_OF_ITS_OWN = 0b101  # a reduced copy, or a mask, of another page
 _GDAL_NODATA = 42113
-# how tifffile fails on damaged tags: it has no one error for that
-_DAMAGE = (
-    ValueError,
-    TypeError,
-    LookupError,
-    AttributeError,
-    ArithmeticError,
-    RuntimeError,
-    MemoryError,
-    ImportError,
-    struct.error,
-    zlib.error,
-)
 # what tifffile logs about damage is raised here
 logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
@@ -233,7 +220,9 @@ def _first_page(data: bytes, name: str) -> Iterator[tuple[Any, Any]]:
     try:
         with tifffile.TiffFile(io.BytesIO(data)) as file:
             yield file, file.pages[0]
-    except (tifffile.TiffFileError, *_DAMAGE):
+    except InputError:
+        raise
+    except Exception:  # noqa: BLE001 (tifffile has no one error for damaged tags)
         raise InputError(f"{name}: is a damaged or truncated TIFF") from None
 
 
@@ -263,7 +252,7 @@ def _pixels(page: Any, data: bytes, name: str) -> NDArray[Any]:
                 values = page.asarray().reshape(shape)
     except DamagedPartError as error:
         raise InputError(f"{name}: is a damaged TIFF: its compressed data are wrong ({error})") from None
-    except _DAMAGE as error:
+    except Exception as error:  # noqa: BLE001 (of tifffile, imagecodecs, OpenCV or NumPy)
         missing = isinstance(error, ImportError) or "imagecodecs" in str(error)
         hint = ": pip install imagecodecs" if missing else ""
         raise InputError(f"{name}: its pixels cannot be decoded ({how}){hint}") from None
