@@ -31,7 +31,6 @@ _HEAD = 2**16  # bytes: the header of an array
 _READ_ONLY = "web servers are read from, not written to"
 STREAM = "-"  # how the command line names standard input and output
 _STDOUT_NAME = "standard output"
-_AT_ONCE = 16  # requests, of 50 ms each: 10,000 small objects take half a minute
 
 
 class Note(NamedTuple):
@@ -157,7 +156,7 @@ def fetch_all(locations: Iterable[str], most: int = MOST_BYTES) -> dict[str, byt
         One of them cannot be read.
     """
     every = list(locations)
-    return dict(zip(every, atomic.in_threads(partial(read_bytes, most=most), every, _AT_ONCE), strict=True))
+    return dict(zip(every, atomic.in_threads(partial(read_bytes, most=most), every), strict=True))
 
 
 def _read_url(location: str, most: int) -> tuple[bytes, str]:
@@ -249,21 +248,16 @@ def create(location: str, data: bytes, owner: str = "", *, durable: bool = True)
     try:
         atomic.write_atomic(location, data, durable=durable, replaces=False)
     except atomic.NameTakenError:
-        there = _beginning_of(location, len(data))
+        try:
+            there = _read_file(location, location, len(data))
+        except InputError:  # no regular file of at most so many bytes
+            return False
         if there == data:  # by a worker that died before it could say so, perhaps
             return True
-        if durable or there is None or not data.startswith(there.rstrip(b"\0")):
+        if durable or not data.startswith(there.rstrip(b"\0")):
             return False
         atomic.write_atomic(location, data)
     return True
-
-
-def _beginning_of(path: str, size: int) -> bytes | None:
-    """Read a regular file of at most so many bytes; None for all else."""
-    with contextlib.suppress(OSError, InputError):
-        if Path(path).lstat().st_size <= size:
-            return _read_file(path, path)
-    return None
 
 
 def list_names(folder: str) -> list[str]:
@@ -296,7 +290,7 @@ def remove(location: str) -> None:
 
 def remove_all(locations: Iterable[str]) -> None:
     """Remove many files or objects at once; see `remove`."""
-    atomic.in_threads(remove, list(locations), _AT_ONCE)
+    atomic.in_threads(remove, list(locations))
 
 
 def _read_file(path: str, name: str, most: int = MOST_BYTES, begins: Beginning = None) -> bytes:

@@ -133,5 +133,5 @@ def test_where_the_system_starts_no_more_threads_the_others_do_it_all(tmp_path, 
     for file in files:
         file.write_bytes(b"x")
     sync_files(files)
-    assert in_threads(len, [[0] * number for number in range(9)], 4) == list(range(9))
+    assert in_threads(len, [[0] * number for number in range(40)]) == list(range(40))
     assert list(fetch_all(map(str, files)).values()) == [b"x"] * 40

@@ -17,7 +17,7 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO, Literal, NamedTuple
 
 from rollcli.errors import InputError, reading
 from rollcli.files.bounded import MOST_BYTES, most_unpacked
@@ -134,6 +134,11 @@ class _Records(NamedTuple):
     unpacked: bool = False
 
 
+# of a record: whether it holds messages, as a chunk does, or is what stands among them, or else None; where
+# the next one begins, which is nowhere behind the last that counts; and a chunk's compression and size
+_Head = tuple[Literal["messages", "itself"] | None, int, str, int]
+
+
 class _Chunked:
     """A file of chunks that hold messages; subclasses know how records look, and at which byte they start."""
 
@@ -216,11 +221,19 @@ class _Chunked:
         unpacking = _unpacking(compression, self._file.read(there))
         return _Source(unpacking, size, at_once=at_once or there < packed)
 
-    def _bare(self, offset: int, after: int, wanted: _Wanted) -> _Records:
-        """Return the message that is a record of its own, in no chunk."""
+    def _record(self, offset: int, wanted: _Wanted, *, at_once: bool = False) -> _Records:
+        """Read the record at an offset, and of one that is cut off what is whole in it."""
         self._file.seek(offset)
-        size = after - offset
-        return self._walked(_Source(self._file, min(size, self._size - offset)), wanted, size, after)
+        holds, after, compression, size = self._head()
+        if holds is None:
+            return _Records([], after, after <= self._size)
+        if holds == "messages":
+            content = self._content(compression, after - self._file.tell(), size, at_once=at_once)
+        else:
+            self._file.seek(offset)
+            size = after - offset
+            content = _Source(self._file, min(size, self._size - offset))
+        return self._walked(content, wanted, size, after)
 
     def _walked(self, source: _Source, wanted: _Wanted, size: int, after: int) -> _Records:
         """Return the messages that are whole in a record of a size, each with as many bytes as are wanted."""
@@ -241,8 +254,8 @@ class _Chunked:
         """Return where topics are listed behind the messages; 0 where they are not."""
         raise NotImplementedError
 
-    def _record(self, offset: int, wanted: _Wanted, *, at_once: bool = False) -> _Records:
-        """Read the record at an offset, and of one that is cut off what is whole in it."""
+    def _head(self) -> _Head:
+        """Take a record, where the file stands, up to what it holds."""
         raise NotImplementedError
 
     def _message(self, source: _Source) -> tuple[int, int, int] | None:
@@ -264,21 +277,15 @@ class _Mcap(_Chunked):
         opcode, start = struct.unpack_from("<B8xQ", _exactly(self._file, 17))
         return int(start) if opcode == 0x02 else 0
 
-    def _record(self, offset: int, wanted: _Wanted, *, at_once: bool = False) -> _Records:
-        self._file.seek(offset)
+    def _head(self) -> _Head:
         opcode, length = struct.unpack("<BQ", _exactly(self._file, 9))
-        after = offset + 9 + length
         if opcode in (0x02, 0x0F):  # footer, end of data
-            return _Records([], -1)
-        if opcode not in (0x03, 0x04, 0x05, 0x06):
-            return _Records([], after, after <= self._size)
+            return None, -1, "", 0
+        after = self._file.tell() + length
         if opcode != 0x06:
-            return self._bare(offset, after, wanted)
+            return "itself" if opcode in (0x03, 0x04, 0x05) else None, after, "", 0
         size, name_length = struct.unpack("<16xQ4xI", _exactly(self._file, 32))
-        compression = _exactly(self._file, name_length + 8)[:-8].decode()
-        packed = after - self._file.tell()
-        content = self._content(compression, packed, size, at_once=at_once)
-        return self._walked(content, wanted, size, after)
+        return "messages", after, _exactly(self._file, name_length + 8)[:-8].decode(), size
 
     def _message(self, source: _Source) -> tuple[int, int, int] | None:
         opcode, length = struct.unpack("<BQ", source.take(9))
@@ -313,25 +320,21 @@ class _Ros1(_Chunked):
 
     def _index(self) -> int:
         self._file.seek(len(_BAG))
-        (length,) = struct.unpack("<I", _exactly(self._file, 4))
-        return int(struct.unpack("<Q", _fields(_exactly(self._file, length))[b"index_pos"])[0])
+        fields = _fields(_exactly(self._file, self._length()))
+        return int(struct.unpack("<Q", fields[b"index_pos"])[0])
 
-    def _record(self, offset: int, wanted: _Wanted, *, at_once: bool = False) -> _Records:
-        self._file.seek(offset)
-        (length,) = struct.unpack("<I", _exactly(self._file, 4))
-        fields = _fields(_exactly(self._file, length))
-        (length,) = struct.unpack("<I", _exactly(self._file, 4))
-        after, op = self._file.tell() + length, fields[b"op"][0]
+    def _head(self) -> _Head:
+        fields = _fields(_exactly(self._file, self._length()))
+        after = self._length() + self._file.tell()
+        op = fields[b"op"][0]
         if fields.get(b"encryptor"):
             raise InputError(f"{self.path}: is encrypted: decrypt it first (rosbag decrypt)")
-        if op not in (0x02, 0x05, 0x07):
-            return _Records([], after, after <= self._size)
         if op != 0x05:
-            return self._bare(offset, after, wanted)
-        (size,) = struct.unpack("<I", fields[b"size"])
-        compression = fields[b"compression"].decode()
-        content = self._content(compression, length, size, at_once=at_once)
-        return self._walked(content, wanted, size, after)
+            return "itself" if op in (0x02, 0x07) else None, after, "", 0
+        return "messages", after, fields[b"compression"].decode(), *struct.unpack("<I", fields[b"size"])
+
+    def _length(self) -> int:
+        return int.from_bytes(_exactly(self._file, 4), "little")
 
     def _message(self, source: _Source) -> tuple[int, int, int] | None:
         fields = _fields(bytes(source.take(*struct.unpack("<I", source.take(4)))))
