@@ -228,12 +228,11 @@ def _take_free_name(temporary: Path, target: Path) -> None:
     """
     try:
         os.link(temporary, target)
-    except FileExistsError:
-        raise NameTakenError(f"{target}: exists already") from None
     except OSError as error:
-        if error.errno not in _NO_LINKS:
+        if error.errno not in (errno.EEXIST, *_NO_LINKS):
             raise
-        if os.path.lexists(target):  # not in one step with the next line: the best that such a disk can do
+        # without links not in one step with the next line: the best that such a disk can do
+        if error.errno == errno.EEXIST or os.path.lexists(target):
             raise NameTakenError(f"{target}: exists already") from None
         temporary.replace(target)
     else:

@@ -147,8 +147,8 @@ def decode_image(data: bytes, name: str) -> NDArray[Any]:
     """
     if data.startswith(png.SIGNATURE):
         return png.picture(data, name)
-    if data.startswith(arrays.MAGIC) and (grey := arrays.decode_npy(data, name).values).dtype in _GREY:
-        return grey
+    if data.startswith(arrays.MAGIC) and arrays.check_npy(data, len(data), name)[0] in _GREY:
+        return arrays.decode_npy(data, name).values
     if data.startswith(tiff.SIGNATURES):
         return tiff.picture(data, name)
     if data.startswith(pictures.SIGNATURES):

@@ -49,7 +49,8 @@ def check_npy(head: bytes, size: int, name: str) -> tuple[np.dtype[Any], bool, t
         dtype, Fortran order, shape (H, W), and where the numbers start.
     """
     dtype, fortran, shape, start = _header(head, name)
-    shape = _without_single_axis(shape)
+    if len(shape) == 3 and 1 in (shape[0], shape[2]):  # the numbers lie as those of (H, W) do
+        shape = shape[1:] if shape[0] == 1 else shape[:2]
     raw_map.require_map_shape(shape, name)
     needed, there = math.prod(shape) * dtype.itemsize, size - start
     if there < needed:
@@ -65,13 +66,6 @@ def encode_npy(values: NDArray[Any]) -> bytes:
     values, buffer = np.ascontiguousarray(values), io.BytesIO()
     np.lib.format.write_array_header_1_0(buffer, np.lib.format.header_data_from_array_1_0(values))
     return b"".join([buffer.getvalue(), values.data])  # write_array copies the numbers twice
-
-
-def _without_single_axis(shape: tuple[int, ...]) -> tuple[int, ...]:
-    """Return (H, W) of an array with one axis of length 1 before or behind: its numbers lie as those do."""
-    if len(shape) == 3 and shape[0] == 1:
-        return shape[1:]
-    return shape[:2] if len(shape) == 3 and shape[2] == 1 else shape
 
 
 def decode_npz(data: bytes, name: str) -> Stored:
