@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from rollcli.errors import InputError, UsageError, as_usage, reading
 from rollcli.files.atomic import is_file, is_folder
 from rollcli.files.bounded import most_unpacked, state_of, too_large
-from rollcli.files.naming import natural_key
+from rollcli.files.naming import natural_key, split_position
 from rollcli.files.stores.locations import is_url
 
 if TYPE_CHECKING:
@@ -32,7 +32,6 @@ _PACKED = (".tar.gz", ".tgz", ".tar.xz", ".tar.bz2", ".tar.zst", ".7z", ".rar")
 _KINDS = "|".join(each[1:] for each in (*ARCHIVES, *BAGS, *VIDEOS))
 _INSIDE = re.compile(rf"(.*?\.(?:{_KINDS}))#(.*)", re.IGNORECASE | re.DOTALL)
 _MOST_LINKS = 40  # as many as Linux follows
-_POSITION = re.compile(r"#@([0-9]+(?:\+[0-9]+)+)$")
 
 
 def split_member(location: str) -> tuple[str, str] | None:
@@ -53,7 +52,7 @@ def file_of(location: str) -> str:
 
 def shown(location: str) -> str:
     """Return a location without where its frame lies in the file."""
-    return _POSITION.sub("", location) if "#@" in location else location
+    return split_position(location)[0]
 
 
 def frame_name(name: str) -> str:
@@ -179,7 +178,9 @@ def read_member(location: str, name: str, most: int) -> "bytes | NDArray[Any] | 
         if path.lower().endswith(".tar"):
             return _read_tar(path, member, name, most)
         if path.lower().endswith(BAGS):
-            return _read_bag(path, member, name)
+            from rollcli.files.recordings.frames import read_frame
+
+            return read_frame(path, member, name)
         if path.lower().endswith(VIDEOS):
             from rollcli.files.recordings.video import read_video_frame
 
@@ -187,22 +188,11 @@ def read_member(location: str, name: str, most: int) -> "bytes | NDArray[Any] | 
         return _read_zip(path, member, name, most)
 
 
-def _read_bag(path: str, member: str, name: str) -> "bytes | NDArray[Any]":
-    from rollcli.files.recordings.frames import broken_part, read_frame
-
-    if member == "rest":
-        raise InputError(f"{name}: {broken_part(path)}")
-    place = _POSITION.search(member)
-    return read_frame(path, shown(member), [int(each) for each in place[1].split("+")] if place else [], name)
-
-
 def _read_tar(path: str, member: str, name: str, most: int) -> bytes:
-    found = _POSITION.search(member)
-    if found is None:
-        found = _POSITION.search(dict(_tar_members(path)).get(member, ""))
-    if found is None:
+    position = split_position(member)[1] or split_position(dict(_tar_members(path)).get(member, ""))[1]
+    if not position:
         raise InputError(f"{name}: no such file in {path}")
-    start, size = map(int, found[1].split("+"))
+    start, size = position
     if size > most:
         raise too_large(name, size, most)
     with Path(path).open("rb") as file:

@@ -21,6 +21,7 @@ _NUMBERS = ((_NEVER, _NEVER), ("0", "1"), ("2", "3"), ("1", "2"), ("1", "5"), ("
 _NUMBERED = (
     r"((?<![A-Za-z])(?:im|img|image|cam|camera|view)[_-]?|(?<=[A-Za-z0-9])[_-](?=0*{0}$))0*{0}(?![0-9])"
 )
+_POSITION = re.compile(r"#@([0-9]+(?:\+[0-9]+)+)$")
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +49,14 @@ class Input:
     def path(self) -> Path:
         """Where it is; made when asked for, since a path takes ten times the memory of its text."""
         return Path(self.location)
+
+
+def split_position(location: str) -> tuple[str, tuple[int, ...]]:
+    """Split off where a frame lies in its file, in whole numbers; none where the location does not say."""
+    found = _POSITION.search(location) if "#@" in location else None
+    if found is None:
+        return location, ()
+    return location[: found.start()], tuple(map(int, found[1].split("+")))
 
 
 def listed(names: Iterable[str], most: int = 3) -> str:

@@ -26,8 +26,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from rollcli.files.formats import read_image, read_stored
 from rollcli.files.naming import Input
+from rollcli.files.recordings import bags, video
 from rollcli.files.recordings import frames as of_bags
-from rollcli.files.recordings import video
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
 from tests.files.recordings.bag_files import compressed, disparity_image, image, write_bag
@@ -83,8 +83,7 @@ def by_library(path: Path) -> int:
 
 def by_rollcli(path: Path) -> int:
     """Find the frames of a bag, and read each."""
-    for cached in (of_bags.opened, of_bags._known_topics):
-        cached.cache_clear()
+    bags._opened.cache_clear()
     found = of_bags.maps_of_bag([str(path)], str(path), "/maps")
     return sum(read_stored(each.location, each.name).values.shape[0] for each, _ in found.frames)
 

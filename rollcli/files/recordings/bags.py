@@ -15,12 +15,12 @@ import struct
 import weakref
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, BinaryIO, Literal, NamedTuple
 
 from rollcli.errors import InputError, reading
-from rollcli.files.bounded import MOST_BYTES, most_unpacked
+from rollcli.files.bounded import MOST_BYTES, most_unpacked, state_of
 
 _BEGINNING = 64  # bytes: a header's time and more
 _MCAP, _BAG, _SQLITE = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n", b"SQLite format 3\0"
@@ -152,8 +152,9 @@ class _Chunked:
         self._last = -1, _Records([], -1)  # what was unpacked last, for the next of its messages
         weakref.finalize(self, self._file.close)
 
+    @cached_property
     def topics(self) -> dict[str, Topic]:
-        """Return the topics by name: as the index says, or what a whole look through the file finds."""
+        """The topics by name: as the index says, or what a whole look through the file finds."""
         try:
             index = self._index()
             while 0 < index < self._size:
@@ -379,20 +380,15 @@ class _Sqlite:
         weakref.finalize(self, self._base.close)
         # reads what is there of a file that is shorter than it says
         self._base.execute("PRAGMA writable_schema=ON")
-        self._names: dict[int, str] = {}
-
-    def topics(self) -> dict[str, Topic]:
-        """Return the topics by name."""
         try:
             rows = self._base.execute(f"SELECT id, {_TEXTS} FROM topics").fetchall()
         except sqlite3.Error as error:
             raise InputError(f"{self.path}: its table of topics cannot be read: {error}") from None
-        self._names = {number: name for number, name, *_ in rows}
-        return {name: Topic(name, kind.replace("/msg/", "/"), form) for _, name, kind, form in rows}
+        self._names: dict[int, str] = {number: name for number, name, *_ in rows}
+        self.topics = {name: Topic(name, kind.replace("/msg/", "/"), form) for _, name, kind, form in rows}
 
     def messages(self, topics: set[str], begins: Collection[str] = ()) -> Iterator[Message]:
         """Yield every whole message of some topics, in the file's order; of some the beginning will do."""
-        self.topics()
         count, whole = 0, self._is_whole() and hasattr(self._base, "blobopen")  # from Python 3.11 on
         try:
             for number, topic, time in self._base.execute(
@@ -455,7 +451,11 @@ def open_bag(path: str) -> Bag:
     raise InputError(f"{path}: {what}")
 
 
+def opened(path: str) -> Bag:
+    """Open a bag, or return the one that is open; see `open_bag`."""
+    return _opened(*state_of(path))
+
+
 @lru_cache(maxsize=4)  # a process opens a bag once
-def opened(path: str, size: int, modified_ns: int, process: int) -> Bag:
-    """Open a bag, or return the one that is open; see `bounded.state_of`."""
+def _opened(path: str, size: int, modified_ns: int, process: int) -> Bag:
     return open_bag(path)

@@ -11,10 +11,9 @@ from typing import Any
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError, as_usage
-from rollcli.files.bounded import state_of
-from rollcli.files.naming import Input, listed, natural_key
+from rollcli.files.naming import Input, listed, natural_key, split_position
 from rollcli.files.recordings import messages
-from rollcli.files.recordings.bags import Bag, Message, Topic, opened
+from rollcli.files.recordings.bags import Message, Topic, opened
 from rollcli.files.recordings.messages import CAMERA_INFO, COMPRESSED, DISPARITY, IMAGE, CameraInfo
 from rollcli.rig.calibration import Calibration
 
@@ -164,7 +163,7 @@ def nearest(lefts: Sequence[int], rights: Sequence[int], tolerance: int) -> list
     return partners
 
 
-def read_frame(path: str, member: str, place: Sequence[int], name: str) -> bytes | NDArray[Any]:
+def read_frame(path: str, member: str, name: str) -> bytes | NDArray[Any]:
     """Read one frame of a bag; see `messages.content_of`.
 
     Parameters
@@ -172,16 +171,19 @@ def read_frame(path: str, member: str, place: Sequence[int], name: str) -> bytes
     path : str
         The bag's file.
     member : str
-        The topic and the stamp, ``/stereo/disparity@1700000000123456789``.
-    place : sequence of int
-        Two numbers; two more of the CameraInfo by which a raw view is rectified; none: it is searched.
+        The topic and the stamp, ``/stereo/disparity@1700000000123456789``, and behind these its place: two
+        numbers; two more of the CameraInfo by which a raw view is rectified; none: it is searched. Or
+        ``rest``, which is an error.
     name : str
         What errors call it.
     """
-    state = state_of(path)
-    bag = opened(*state)
+    bag = opened(path)
+    if member == "rest":
+        list(bag.messages(set()))
+        raise InputError(f"{name}: {bag.broken or 'is whole'}; its whole messages are used")
+    member, place = split_position(member)
     topic_name, _, stamp = member.rpartition("@")
-    topic = _known_topics(*state).get(topic_name)
+    topic = bag.topics.get(topic_name)
     if topic is None:
         raise InputError(f"{name}: no such topic in {path}")
     if not place:
@@ -197,22 +199,6 @@ def read_frame(path: str, member: str, place: Sequence[int], name: str) -> bytes
     return messages.content_of(topic, bag.read((place[0], place[1])).data, name, raw_of)
 
 
-def broken_part(path: str) -> str:
-    """Say what is wrong behind the whole messages of a bag."""
-    bag = _opened(path)
-    list(bag.messages(set()))
-    return f"{bag.broken or 'is whole'}; its whole messages are used"
-
-
-def _opened(path: str) -> Bag:
-    return opened(*state_of(path))
-
-
-@lru_cache(maxsize=4)  # for a bag without an index they are known once it is read
-def _known_topics(path: str, size: int, modified_ns: int, process: int) -> dict[str, Topic]:
-    return opened(path, size, modified_ns, process).topics()
-
-
 @lru_cache(maxsize=2)  # for names without a place, such as those of a result that is drawn
 def _index(path: str, topic: str) -> dict[str, tuple[int, ...]]:
     topics = _topics([path])
@@ -220,14 +206,14 @@ def _index(path: str, topic: str) -> dict[str, tuple[int, ...]]:
     frames, info = found.frames[topic], found.cameras.get(_beside(topic))
     if _RAW in topic and info is not None and info.changes_raw_views:
         frames = [_rectified(found, topic, each) for each in frames]
-    return {each.name.rpartition("@")[2]: _place(each.location) for each in frames}
+    return {each.name.rpartition("@")[2]: split_position(each.location)[1] for each in frames}
 
 
 def _topics(files: Iterable[str]) -> dict[str, Topic]:
     topics: dict[str, Topic] = {}
     for path in files:
         with as_usage():
-            topics |= _known_topics(*state_of(path))
+            topics |= opened(path).topics
     return topics
 
 
@@ -269,7 +255,7 @@ def _only_map_topic(files: Sequence[str], topics: dict[str, Topic], name: str) -
 def _first_encodings(files: Sequence[str], topics: dict[str, Topic], images: set[str]) -> dict[str, str]:
     found: dict[str, str] = {}
     for path in files:
-        for message in _opened(path).messages(images):
+        for message in opened(path).messages(images):
             if message.topic not in found:
                 try:
                     found[message.topic] = messages.image_encoding(topics[message.topic], message.data, path)
@@ -291,7 +277,7 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
     seen: dict[str, int] = {}
     endings: dict[str, str] = {}
     for path in files:
-        bag = _opened(path)
+        bag = opened(path)
         stem = os.path.splitext(os.path.basename(path))[0]  # noqa: PTH119, PTH122
         for message in bag.messages({*by_name, *infos}, by_name):
             place = "{}+{}".format(*message.place)
@@ -367,10 +353,6 @@ def _rectified(found: _Found, topic: str, frame: Input) -> Input:
     return frame if place is None else replace(frame, location=f"{frame.location}+{place}")
 
 
-def _place(location: str) -> tuple[int, ...]:
-    return tuple(map(int, location.rpartition("#@")[2].split("+")))
-
-
 def _message(location: str) -> Message:
-    place = _place(location)
-    return _opened(location.partition("#")[0]).read((place[0], place[1]))
+    _, place = split_position(location)
+    return opened(location.partition("#")[0]).read((place[0], place[1]))

@@ -126,7 +126,7 @@ def _read(data):
         path.write_bytes(data)
         try:
             bag = open_bag(str(path))
-            topics = bag.topics()
+            topics = bag.topics
             found = list(bag.messages(set(topics) - {"none"}, ["/b"]))
         except RollcliError as error:
             return str(error).replace(f"{folder}{os.sep}", "")
