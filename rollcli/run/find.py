@@ -395,11 +395,9 @@ def _frames_of(left: Input, right: Input, layout: Layout | None) -> list[tuple[I
         return [(left, right)]
     for each in (left, right):
         _require_local(each.location)
-    from rollcli.files.recordings.video import frames_of_pair, frames_of_video
+    from rollcli.files.recordings.video import frames_of
 
-    if layout is None:
-        return frames_of_pair(left, right)
-    return [(view, view) for view in frames_of_video(left, layout)]
+    return frames_of(left, right, layout)
 
 
 def _require_local(location: str) -> None:

@@ -1,7 +1,7 @@
 """The frames of a recording for Python: `rollcli.open_recording`."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,7 @@ from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import read_image, read_stored
 from rollcli.files.naming import Input
 from rollcli.files.recordings.frames import maps_of_bag, pairs_of_bag
-from rollcli.files.recordings.video import frames_of_pair, frames_of_video
+from rollcli.files.recordings.video import frames_of
 from rollcli.rig.calibration import Calibration
 
 
@@ -93,44 +93,39 @@ def open_recording(
     rollcli.errors.UsageError: rolls.csv: is no .bag, .db3, .mcap or rosbag2 folder
     """
     name = os.fspath(path)
+    layout = side_by_side if is_video(name) else None
     if is_video(name):
-        yield from _video(name, None if right is None else os.fspath(right), side_by_side)
-        return
-    files = bag_files(name)
-    if not files:
-        raise UsageError(f"{name}: is no .bag, .db3, .mcap or rosbag2 folder")
-    require_extra("bags", name)
-    if left_topic is not None and right_topic is not None:
-        found = pairs_of_bag(files, name, left_topic, right_topic, round(sync_tolerance * 1e9))
-    elif left_topic is not None or right_topic is not None:
-        raise UsageError("left_topic and right_topic are given together")
+        frames, camera = _of_videos(name, None if right is None else os.fspath(right), layout), None
     else:
-        found = maps_of_bag(files, name, topic)
-    camera = found.calibration
-    for one, other in found.frames:
+        files = bag_files(name)
+        if not files:
+            raise UsageError(f"{name}: is no .bag, .db3, .mcap or rosbag2 folder")
+        require_extra("bags", name)
+        if left_topic is not None and right_topic is not None:
+            found = pairs_of_bag(files, name, left_topic, right_topic, round(sync_tolerance * 1e9))
+        elif left_topic is not None or right_topic is not None:
+            raise UsageError("left_topic and right_topic are given together")
+        else:
+            found = maps_of_bag(files, name, topic)
+        frames, camera = found.frames, found.calibration
+    for one, other in frames:
         if other is None:
             stored = read_stored(one.location, one.name)
             read = to_disparity(stored, encoding=encoding, scale=scale, calibration=camera)
             yield RecordedFrame(one.name, one.stamp, read.disparity, None, None, camera)
         else:
-            views = read_image(one.location, one.name), read_image(other.location, other.name)
+            left = read_image(one.location, one.name)
+            views = (
+                views_of(left, layout, one.name) if layout else (left, read_image(other.location, other.name))
+            )
             yield RecordedFrame(one.name, one.stamp, None, *views, camera)
 
 
-def _video(name: str, right: str | None, layout: str | None) -> Iterator[RecordedFrame]:
+def _of_videos(name: str, right: str | None, layout: str | None) -> Sequence[tuple[Input, Input | None]]:
     if (right is None) == (layout is None) or layout not in (None, "left-right", "top-bottom"):
         raise UsageError(
             f'{name}: is a video: give side_by_side="left-right" or "top-bottom" where its frames hold both '
             "views, or right, the video of the other one"
         )
-    if right is None:
-        frames = [(each, each) for each in frames_of_video(Input(name, name, name), layout)]
-    else:
-        frames = frames_of_pair(Input(name, name, name), Input(right, right, right))
-    for one, other in frames:
-        image = read_image(one.location, one.name)
-        if layout is None:
-            views = image, read_image(other.location, other.name)
-        else:
-            views = views_of(image, layout, one.name)
-        yield RecordedFrame(one.name, one.stamp, None, *views, None)
+    left, other = (Input(each, each, each) for each in (name, right or name))
+    return frames_of(left, other, layout)

@@ -44,16 +44,11 @@ class Video(NamedTuple):
     broken: str
 
 
-def look_through(path: str, name: str, *, decode: bool = False) -> Video:
-    """Count the frames of a video: the number that its container states is a guess.
-
-    Raises
-    ------
-    UsageError
-        It cannot be opened, or has no frame.
-    """
+def _known(source: Input, *, decode: bool) -> Video:
+    """Count the frames of a video: the number that its container states is a guess."""
     with as_usage():
-        return _look_through(*state_of(path), name, decode or _leaves_out(path))
+        path = source.location
+        return _look_through(*state_of(path), source.name, decode or _leaves_out(path))
 
 
 @lru_cache(maxsize=4)
@@ -68,35 +63,23 @@ def _look_through(path: str, size: int, modified_ns: int, process: int, name: st
     return Video(count, decoder.width, decoder.height, broken)
 
 
-def frames_of_video(source: Input, layout: str | None) -> list[Input]:
-    """List the frames of a video; what is broken behind them is one more, which fails and says so.
+def frames_of(left: Input, right: Input, layout: str | None) -> list[tuple[Input, Input]]:
+    """List the frames of a video that holds both views as `layout` says; or pair those of two by number.
+
+    What is broken behind the frames of a video is one more, which fails and says so.
 
     Raises
     ------
     UsageError
-        See `look_through`; or its frames cannot be halved as `layout` says.
+        A video cannot be opened, has no frame, or has one that cannot be halved; or two differ in size; or in
+        length, and neither is cut off.
     """
-    return _frames_of(look_through(source.location, source.name), source, layout)
-
-
-def _frames_of(video: Video, source: Input, layout: str | None) -> list[Input]:
-    path, name, stem = source.location, source.name, os.path.splitext(source.relative)[0]  # noqa: PTH122
+    one = _known(left, decode=layout is None)
     if layout is not None:
         with as_usage():
-            half_size(video.width, video.height, layout, name)
-    numbers = [f"{number:06d}" for number in range(video.frames)] + (["rest"] if video.broken else [])
-    return [Input(f"{path}#{each}", f"{name}#{each}", f"{stem}_{each}.png") for each in numbers]
-
-
-def frames_of_pair(left: Input, right: Input) -> list[tuple[Input, Input]]:
-    """Pair the frames of two videos by their numbers.
-
-    Raises
-    ------
-    UsageError
-        They differ in size; or in length, and neither is cut off.
-    """
-    one, other = (look_through(each.location, each.name, decode=True) for each in (left, right))
+            half_size(one.width, one.height, layout, left.name)
+        return [(each, each) for each in _listed(one, left)]
+    other = _known(right, decode=True)
     if (one.width, one.height) != (other.width, other.height):
         raise UsageError(
             f"{left.name} has {one.width}x{one.height} px, {right.name} {other.width}x{other.height}: give "
@@ -107,10 +90,16 @@ def frames_of_pair(left: Input, right: Input) -> list[tuple[Input, Input]]:
             f"{left.name} has {one.frames} frames, {right.name} {other.frames}: they pair up by number, and "
             "behind a frame that one camera dropped all pairs are wrong: cut both to the same moments"
         )
-    both = [_frames_of(video, each, None) for video, each in ((one, left), (other, right))]
+    both = [_listed(video, each) for video, each in ((one, left), (other, right))]
     few = min(one.frames, other.frames)
     ends = [frames[-1] for frames, video in zip(both, (one, other), strict=True) if video.broken]
     return [*zip(both[0][:few], both[1][:few], strict=True), *((end, end) for end in ends)]
+
+
+def _listed(video: Video, source: Input) -> list[Input]:
+    path, name, stem = source.location, source.name, os.path.splitext(source.relative)[0]  # noqa: PTH122
+    numbers = [f"{number:06d}" for number in range(video.frames)] + (["rest"] if video.broken else [])
+    return [Input(f"{path}#{each}", f"{name}#{each}", f"{stem}_{each}.png") for each in numbers]
 
 
 def read_video_frame(path: str, frame: str, name: str) -> NDArray[Any]:
