@@ -15,8 +15,7 @@ from rollcli.evaluate.truth import KnownPose, by_stem, read_truth
 from rollcli.files.atomic import is_folder
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_stored
-from rollcli.files.inputs import find_inputs
-from rollcli.files.matching import stem_of
+from rollcli.files.inputs import find_inputs, stem_of
 from rollcli.files.naming import listed
 from rollcli.files.results import Result, Row, csv_table, read_result, run_path
 from rollcli.files.search import Search

@@ -22,7 +22,7 @@ from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.estimator.solvers.solution import Solution, Solver, SolverStatus, angle_between, principal
 from rollcli.evaluate.options import PaperOptions
 from rollcli.evaluate.truth import KnownPose
-from rollcli.files.matching import stem_of
+from rollcli.files.inputs import stem_of
 from rollcli.files.results import Row
 from rollcli.run.frame import Frame, FrameResult, failed_frame
 from rollcli.run.read import FRAME_ERRORS, Source, frame_of_error, read_source

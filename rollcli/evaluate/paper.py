@@ -10,7 +10,7 @@ from rollcli.errors import ExitStatus, UsageError
 from rollcli.evaluate.options import PaperOptions
 from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.extras import require_extra
-from rollcli.files.matching import stem_of
+from rollcli.files.inputs import stem_of
 from rollcli.files.storage import write_output
 from rollcli.run.find import Named, map_frames
 from rollcli.run.frame import Frame

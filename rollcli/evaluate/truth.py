@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.bounded import as_utf8
-from rollcli.files.matching import stem_of
+from rollcli.files.inputs import stem_of
 from rollcli.files.results import TEXT
 from rollcli.files.storage import read_named
 

@@ -16,15 +16,7 @@ from pathlib import Path
 from rollcli.errors import UsageError, reading
 from rollcli.files.atomic import is_file, is_folder, mode_of
 from rollcli.files.containers import frame_name, is_archive, members, refuse_packed
-from rollcli.files.stores.locations import (
-    OBJECT_STORES,
-    base_name,
-    is_object_url,
-    is_url,
-    public_name,
-    scheme_of,
-    split_url,
-)
+from rollcli.files.stores.locations import base_name, is_object_url, is_url, public_name, split_url
 from rollcli.files.stores.objects import has_objects, list_objects
 
 MAP_ENDINGS = (".png", ".tif", ".tiff", ".npy", ".npz", ".pfm", ".exr")
@@ -41,7 +33,7 @@ def is_folder_url(url: str) -> bool:
     It ends at a slash or a bucket, or its last part has no ending; or it has one that no file has which is
     read here, as of a date, and objects lie below it.
     """
-    if scheme_of(url) not in OBJECT_STORES:
+    if not is_object_url(url):
         return False
     key = split_url(url)[1]
     ending = posixpath.splitext(key)[1].lower()

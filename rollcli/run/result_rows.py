@@ -8,7 +8,7 @@ from pathlib import Path
 from rollcli.errors import RollcliError, UsageError
 from rollcli.files.atomic import is_there
 from rollcli.files.containers import file_of
-from rollcli.files.matching import is_elsewhere, match_paths
+from rollcli.files.inputs import is_elsewhere, match_paths
 from rollcli.files.naming import listed
 from rollcli.files.results import Row, read_result, run_path
 from rollcli.files.stores.locations import is_remote, is_url

@@ -18,8 +18,7 @@ from rollcli.errors import RollcliError
 from rollcli.files import bounded, containers, encodings, locking, naming
 from rollcli.files.codecs import pictures
 from rollcli.files.formats import decode_image, decode_mask, decode_stored, encode_stored
-from rollcli.files.inputs import find_inputs, pair_inputs
-from rollcli.files.matching import is_elsewhere, match_paths
+from rollcli.files.inputs import find_inputs, is_elsewhere, match_paths, pair_inputs
 from rollcli.files.result_columns import read_columns
 from rollcli.files.results import FURTHER, Row, column_types, format_header, format_row, parse_rows
 from rollcli.files.search import IMAGE_ENDINGS, Search
