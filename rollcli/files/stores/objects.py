@@ -17,29 +17,37 @@ from rollcli.files.stores.locations import public_name, split_url, wait_for_room
 TIMEOUT_VARIABLE = "ROLLCLI_STORE_TIMEOUT"  # seconds a request may take
 _REQUEST_S = 60.0  # a map of 10 MB at 1.4 Mbit/s takes as long
 DENIED = "access is denied; check the rights of these keys"
-_NO_BUCKET = "there is no such bucket"
-_EXPIRED = "the keys have expired; fetch new ones"
 NO_OBJECT = "there is no such object"
 _CUT = "the answer of the store was cut short"
 _REFUSED = "the store refused the request"
 _ANSWERED = "the store answered"
-_CODES = {
-    "NoSuchBucket": _NO_BUCKET,
-    "AccessDenied": DENIED,
-    "InvalidAccessKeyId": "the access key is unknown; check AWS_ACCESS_KEY_ID",
-    "SignatureDoesNotMatch": "the secret key is wrong; check AWS_SECRET_ACCESS_KEY",
-    "ExpiredToken": _EXPIRED,
-    "ContainerNotFound": _NO_BUCKET,
-    "AuthenticationFailed": "the keys are wrong or have expired; check AZURE_STORAGE_ACCOUNT_KEY",
-    "InvalidAuthenticationInfo": _EXPIRED,
-    "RequestTimeTooSkewed": "this machine's clock differs from the store's; set it",
-    "PermanentRedirect": "the bucket is in another region; set AWS_REGION",
-    "AuthorizationHeaderMalformed": "the bucket is in another region; set AWS_REGION",
-    "IllegalLocationConstraintException": "the bucket is in another region; set AWS_REGION",
-}
 _TOO_LONG = f"the store takes too long; {TIMEOUT_VARIABLE} sets the seconds it may take"
-_NO_KEYS = ("169.254.169.254", "metadata.google.internal")  # where machines of a cloud find theirs
-_REDIRECT = re.compile("Received redirect without LOCATION|301 Moved Permanently")
+_ELSEWHERE = "the bucket is in another region; set AWS_REGION"
+_NO_KEYS = r"169\.254\.169\.254|metadata\.google\.internal"  # where machines of a cloud find theirs
+_REDIRECT = "Received redirect without LOCATION|301 Moved Permanently"
+_MISSING = "missing: "  # stands before what is said of an object that is not there
+# what stores say, and what it means: the first that fits
+_MEANINGS = {
+    "<Code>(NoSuchBucket|ContainerNotFound)<": "there is no such bucket",
+    "<Code>AccessDenied<": DENIED,
+    "<Code>InvalidAccessKeyId<": "the access key is unknown; check AWS_ACCESS_KEY_ID",
+    "<Code>SignatureDoesNotMatch<": "the secret key is wrong; check AWS_SECRET_ACCESS_KEY",
+    "<Code>(ExpiredToken|InvalidAuthenticationInfo)<": "the keys have expired; fetch new ones",
+    "<Code>AuthenticationFailed<": "the keys are wrong or have expired; check AZURE_STORAGE_ACCOUNT_KEY",
+    "<Code>RequestTimeTooSkewed<": "this machine's clock differs from the store's; set it",
+    "<Code>(PermanentRedirect|AuthorizationHeaderMalformed|IllegalLocationConstraintException)<": _ELSEWHERE,
+    f"^{_MISSING}": NO_OBJECT,
+    _NO_KEYS: "no keys are given; set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or the store's own",
+    _REDIRECT: _ELSEWHERE,
+    "MissingAccount": "no account is given; set AZURE_STORAGE_ACCOUNT_NAME",
+    "non-2xx status code: 401": "the keys are not accepted; check them",
+    "non-2xx status code: 403": DENIED,
+    r"non-2xx status code: (\d+)": rf"{_ANSWERED} \1",
+    "kind: Timeout": _TOO_LONG,
+    "error sending request|onnect": "the store does not answer; check the network and the endpoint",
+    "body": _CUT,
+    "": _REFUSED,
+}
 # what holds names of buckets and objects, which say nothing of what is wrong
 _PATH, _ELEMENT = re.compile(r"(https?://[^/\s\"]*)[^\s\"]*"), re.compile(r"<(?!/?Code>)[^<>]*>[^<]*")
 _STATUS = re.compile(r"non-2xx status code: (\d+)")
@@ -70,27 +78,9 @@ def within_seconds(seconds: float) -> str:
 
 def reason_of(error: Exception) -> str:
     """Say what a store objects to."""
-    text = _without_names(error)
-    for code, meaning in _CODES.items():
-        if f"<Code>{code}</Code>" in text:
-            return meaning
-    if isinstance(error, FileNotFoundError):
-        return NO_OBJECT
-    if any(each in text for each in _NO_KEYS):
-        return "no keys are given; set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or the store's own"
-    if _REDIRECT.search(text):
-        return "the bucket is in another region; set AWS_REGION"
-    if "MissingAccount" in text:
-        return "no account is given; set AZURE_STORAGE_ACCOUNT_NAME"
-    status = _STATUS.search(text)
-    if status:
-        meanings = {"401": "the keys are not accepted; check them", "403": DENIED}
-        return meanings.get(status[1], f"{_ANSWERED} {status[1]}")
-    if "kind: Timeout" in text:
-        return _TOO_LONG
-    if "error sending request" in text or "onnect" in text:
-        return "the store does not answer; check the network and the endpoint"
-    return _CUT if "body" in text else _REFUSED
+    text = (_MISSING if isinstance(error, FileNotFoundError) else "") + _without_names(error)
+    fitting = ((re.search(said, text), meaning) for said, meaning in _MEANINGS.items())
+    return next(found.expand(meaning) for found, meaning in fitting if found)
 
 
 def _without_names(error: Exception) -> str:
@@ -101,7 +91,7 @@ def _without_names(error: Exception) -> str:
 def is_final(error: Exception) -> bool:
     """Tell whether a store would answer the same again: it has understood the request and refuses it."""
     text = _without_names(error)
-    if _REDIRECT.search(text) or any(each in text for each in _NO_KEYS):
+    if re.search(f"{_REDIRECT}|{_NO_KEYS}", text):
         return True
     status = _STATUS.search(text)
     passing = "<Code>RequestTimeout</Code>" in text or (status and status[1] in ("408", "429"))
