@@ -3,11 +3,15 @@
 Every message is one line and says what to do.
 """
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import IntEnum
 from pathlib import Path
 from types import TracebackType
+
+_ON_WINDOWS = os.name == "nt"
+_WINDOWS_PATH = 259 - 27  # characters of a whole path, less what the name of a temporary file adds
 
 
 class ExitStatus(IntEnum):
@@ -79,6 +83,23 @@ def reading(name: str | Path, subject: str = "", kind: type[RollcliError] = Inpu
         yield
     except OSError as error:
         raise kind(f"{name}: {subject and f'{subject} '}cannot be read: {cause_of(error)}") from error
+
+
+def output_error(path: str | Path, error: OSError) -> OutputError:
+    """Make the error of a failed write: one line that names the target, not the temporary file."""
+    reason = cause_of(error)
+    if _ON_WINDOWS and len(str(Path(path).absolute())) > _WINDOWS_PATH:
+        reason += f" (Windows takes {_WINDOWS_PATH} characters unless its long paths are switched on)"
+    return OutputError(f"{path}: cannot be written: {reason}")
+
+
+@contextmanager
+def writing(path: str | Path) -> Iterator[None]:
+    """Take what the system refuses within the block for a failed write of this file."""
+    try:
+        yield
+    except OSError as error:
+        raise output_error(path, error) from error
 
 
 def raised_at(error: BaseException) -> TracebackType | None:

@@ -9,7 +9,8 @@ from pathlib import PureWindowsPath
 
 import pytest
 
-from rollcli.files import atomic, inputs
+from rollcli import errors
+from rollcli.files import inputs
 from rollcli.files.stores.locations import is_url, public_name
 from tests.run_cli import contents, keep_rows, python, rollcli, write_maps
 from tests.slow import mostly_slow
@@ -86,8 +87,8 @@ def test_paths_of_more_than_260_characters_are_paths(tmp_path):
 def test_a_path_that_windows_does_not_take_is_told_so(monkeypatch):
     failed = FileNotFoundError(2, "No such file or directory")
     long, short = "/" + "x" * 300, "/x"
-    monkeypatch.setattr(atomic, "_ON_WINDOWS", True)
-    assert "(Windows takes 232 characters" in str(atomic.output_error(long, failed))
-    assert str(atomic.output_error(short, failed)) == "/x: cannot be written: no such file or directory"
-    monkeypatch.setattr(atomic, "_ON_WINDOWS", False)
-    assert "Windows" not in str(atomic.output_error(long, failed))
+    monkeypatch.setattr(errors, "_ON_WINDOWS", True)
+    assert "(Windows takes 232 characters" in str(errors.output_error(long, failed))
+    assert str(errors.output_error(short, failed)) == "/x: cannot be written: no such file or directory"
+    monkeypatch.setattr(errors, "_ON_WINDOWS", False)
+    assert "Windows" not in str(errors.output_error(long, failed))

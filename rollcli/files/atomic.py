@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
-from rollcli.errors import OutputError, cause_of
+from rollcli.errors import OutputError, cause_of, writing
 from rollcli.files.locking import being_written, nobody_writes
 from rollcli.files.stores.locations import is_url
 
@@ -134,7 +134,6 @@ def _sync(flags: int, harmless: Sequence[int], path: Path) -> None:
 
 
 _LONGEST_NAME = 225  # bytes; file systems allow 255 with what is added
-_WINDOWS_PATH = 259 - 27  # characters of a whole path, less what the temporary file's name adds
 _RANDOM_BYTES = 8
 _NO_LINKS = (errno.EPERM, errno.EINVAL, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP)  # of FAT, say
 _PART = re.compile(rf"\.(.+)\.[0-9a-f]{{{2 * _RANDOM_BYTES}}}\.part", re.DOTALL)
@@ -142,23 +141,6 @@ _PART = re.compile(rf"\.(.+)\.[0-9a-f]{{{2 * _RANDOM_BYTES}}}\.part", re.DOTALL)
 
 class NameTakenError(OutputError):
     """There is something of this name already, which must not be replaced."""
-
-
-def output_error(path: str | Path, error: OSError) -> OutputError:
-    """Make the error of a failed write: one line that names the target, not the temporary file."""
-    reason = cause_of(error)
-    if _ON_WINDOWS and len(str(Path(path).absolute())) > _WINDOWS_PATH:
-        reason += f" (Windows takes {_WINDOWS_PATH} characters unless its long paths are switched on)"
-    return OutputError(f"{path}: cannot be written: {reason}")
-
-
-@contextlib.contextmanager
-def writing(path: str | Path) -> Iterator[None]:
-    """Take what the system refuses within the block for a failed write of this file."""
-    try:
-        yield
-    except OSError as error:
-        raise output_error(path, error) from error
 
 
 @contextlib.contextmanager

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from rollcli.errors import OutputError, UsageError, cause_of
+from rollcli.errors import UsageError, writing
 from rollcli.messages import say
 
 # a killed run's workers end a moment after it; a lock held longer than this belongs to a run that lives
@@ -125,11 +125,9 @@ def locked_folder(name: str) -> Iterator[None]:
     OutputError
         The folder cannot be made.
     """
-    try:
+    with writing(name):
         Path(name).mkdir(parents=True, exist_ok=True)
         descriptor = None if sys.platform == "win32" else os.open(name, os.O_RDONLY | os.O_CLOEXEC)
-    except OSError as error:
-        raise OutputError(f"{name}: cannot be written: {cause_of(error)}") from error
     if descriptor is None:
         yield
         return
@@ -147,14 +145,13 @@ def _lock_file(name: str) -> Iterator[None]:
     A run that is killed leaves it: whether it was another machine's, only the user can tell.
     """
     path = Path(f"{name}{_LOCK}")
-    try:
-        path.touch(exist_ok=False)
-    except FileExistsError:
-        raise UsageError(
-            f"{name}: another run is writing this result; if none is, one was killed: remove {path}"
-        ) from None
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {cause_of(error)}") from error
+    with writing(path):
+        try:
+            path.touch(exist_ok=False)
+        except FileExistsError:
+            raise UsageError(
+                f"{name}: another run is writing this result; if none is, one was killed: remove {path}"
+            ) from None
     try:
         yield
     finally:

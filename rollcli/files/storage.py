@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rollcli.errors import InputError, OutputError, UsageError, reading
+from rollcli.errors import InputError, OutputError, UsageError, output_error, reading, writing
 from rollcli.files import atomic, bounded
 from rollcli.files.bounded import MOST_BYTES, too_large
 from rollcli.files.containers import file_of, read_member
@@ -284,7 +284,7 @@ def remove(location: str) -> None:
         _require_writable(location)
         objects.remove_object(location)
         return
-    with atomic.writing(location):
+    with writing(location):
         Path(location).unlink(missing_ok=True)
 
 
@@ -377,7 +377,7 @@ def open_stream(name: str) -> Iterator[Callable[[bytes], None]]:
             raise OutputError(f"{_STDOUT_NAME}: is closed")
         yield partial(write_stream, 1, name=_STDOUT_NAME)
         return
-    with atomic.writing(name):
+    with writing(name):
         descriptor = os.open(name, os.O_WRONLY)
     try:
         yield partial(write_stream, descriptor, name=name)
@@ -401,4 +401,4 @@ def write_stream(descriptor: int, data: bytes, name: str) -> None:
     except BrokenPipeError:
         raise
     except OSError as error:
-        raise atomic.output_error(name, error) from error
+        raise output_error(name, error) from error

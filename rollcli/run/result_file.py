@@ -20,8 +20,8 @@ from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple
 
-from rollcli.errors import InputError, OutputError, RollcliError, UsageError
-from rollcli.files.atomic import atomic_file, look_at, output_error, sync_files, write_atomic, writing
+from rollcli.errors import InputError, OutputError, RollcliError, UsageError, output_error, writing
+from rollcli.files.atomic import atomic_file, look_at, sync_files, write_atomic
 from rollcli.files.locking import locked, take_lock
 from rollcli.files.results import FURTHER, Format, format_header, part_name
 from rollcli.files.storage import Note, noting, read_frame, state_of

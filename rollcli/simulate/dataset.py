@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli import __version__
-from rollcli.errors import ExitStatus, InputError, OutputError, UsageError
-from rollcli.files.atomic import is_there, remove_leftovers, write_atomic, writing
+from rollcli.errors import ExitStatus, InputError, OutputError, UsageError, writing
+from rollcli.files.atomic import is_there, remove_leftovers, write_atomic
 from rollcli.files.codecs.tiff import encode_tiff
 from rollcli.files.encodings import KITTI_TOP, to_kitti
 from rollcli.files.formats import encode_stored
