@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from rollcli.estimator.estimate import RollEstimate as RollEstimate
     from rollcli.estimator.interval import Tangent as Tangent
     from rollcli.files.encodings import read_disparity as read_disparity
-    from rollcli.files.recordings.open import open_recording as open_recording
     from rollcli.pictures.derotate import derotate as derotate
     from rollcli.pictures.heights import height_map as height_map
     from rollcli.pictures.vdisparity import VDisparity as VDisparity
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
     from rollcli.run.find import read_calibration as read_calibration
     from rollcli.run.library import estimate_pair as estimate_pair
     from rollcli.run.library import estimate_roll as estimate_roll
+    from rollcli.run.library import open_recording as open_recording
     from rollcli.stereo.match import compute_disparity as compute_disparity
     from rollcli.stereo.options import StereoOptions as StereoOptions
 
@@ -36,14 +36,13 @@ _NAMES = {
     "rollcli.estimator.estimate": "RollEstimate",
     "rollcli.estimator.interval": "Tangent",
     "rollcli.files.encodings": "read_disparity",
-    "rollcli.files.recordings.open": "open_recording",
     "rollcli.pictures.derotate": "derotate",
     "rollcli.pictures.heights": "height_map",
     "rollcli.pictures.vdisparity": "VDisparity v_disparity",
     "rollcli.rig.calibration": "Calibration",
     "rollcli.rig.drive.assess": "RigAssessment assess_rig",
     "rollcli.run.find": "read_calibration",
-    "rollcli.run.library": "estimate_pair estimate_roll",
+    "rollcli.run.library": "estimate_pair estimate_roll open_recording",
     "rollcli.stereo.match": "compute_disparity",
     "rollcli.stereo.options": "StereoOptions",
 }
