@@ -29,6 +29,7 @@ DOORS = {
     "rollcli.run.convert": "a worker's door",
     "rollcli.run.images": "matplotlib, an extra, loads only for figures",
     "rollcli.run.estimate": "a worker's door",
+    "rollcli.run.library": "loads the readers of recordings only for them",
     "rollcli.run.options": "the command line's help needs no URLs",
     "rollcli.run.read": "loads OpenCV's matcher only for pairs",
     "rollcli.run.result_rows": "estimates maps, which loads NumPy, only of other folders than the rows'",

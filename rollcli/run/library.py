@@ -18,8 +18,6 @@ from rollcli.files.containers import bag_files, is_video
 from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import Stored, read_image, read_stored
 from rollcli.files.naming import Input
-from rollcli.files.recordings.frames import maps_of_bag, pairs_of_bag
-from rollcli.files.recordings.video import frames_of
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import with_pose
 from rollcli.run.diagnosis import PYTHON, looks_like
@@ -282,6 +280,8 @@ def open_recording(
     ...
     rollcli.errors.UsageError: rolls.csv: is no .bag, .db3, .mcap or rosbag2 folder
     """
+    from rollcli.files.recordings.frames import maps_of_bag, pairs_of_bag
+
     name = os.fspath(path)
     layout = side_by_side if is_video(name) else None
     if is_video(name):
@@ -317,5 +317,7 @@ def _of_videos(name: str, right: str | None, layout: str | None) -> Sequence[tup
             f'{name}: is a video: give side_by_side="left-right" or "top-bottom" where its frames hold both '
             "views, or right, the video of the other one"
         )
+    from rollcli.files.recordings.video import frames_of
+
     left, other = (Input(each, each, each) for each in (name, right or name))
     return frames_of(left, other, layout)
