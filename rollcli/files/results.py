@@ -6,9 +6,11 @@ import json
 import math
 import os
 import re
+from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
+from itertools import islice
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, Literal, get_args, get_type_hints
@@ -538,3 +540,80 @@ def _reader(name: str, kind: type) -> Callable[[Any], Any]:
 
 # what makes values of cells, by column
 READERS = {name: _reader(name, kind) for name, kind in column_types(FURTHER).items()}
+_EMPTY = frozenset({"", None})
+_CHUNK = 300  # rows that are held as text: twenty thousand do not fit into a cache, and take a third longer
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResultColumns:
+    """Columns of a result file, and the run that made it.
+
+    Attributes
+    ----------
+    path : str
+    files : list of str
+        The column `file`.
+    status : array of unsigned bytes
+        Positions in `STATUSES`.
+    numbers : mapping of str to array of float
+        By column; NaN where a cell is empty. Columns that the file does not have are not in it.
+    methods : frozenset of str
+        The solvers of the rows that name one.
+    run : mapping or None
+        The content of FILE.run.json.
+    """
+
+    path: str
+    files: list[str]
+    status: "array[int]"
+    numbers: Mapping[str, "array[float]"]
+    methods: frozenset[str]
+    run: Mapping[str, Any] | None
+
+
+def read_columns(path: str, wanted: Sequence[str]) -> ResultColumns:
+    """Read columns of a result that `rollcli estimate` wrote, CSV, JSON Lines or Parquet.
+
+    Parameters
+    ----------
+    path : str
+        "-" is stdin.
+    wanted : sequence of str
+        Names of number columns.
+
+    Returns
+    -------
+    ResultColumns
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or is not a result of `rollcli estimate`; the line is named.
+    """
+    files, status, methods = list[str](), array("B"), set[str]()
+    numbers: dict[str, array[float]] = {}
+    for part, data in pieces_of(path):
+        names, rows = cells_of(data, part, ["file", "status", "method", *wanted])
+        while chunk := list(islice(rows, _CHUNK)):
+            lines, *columns = zip(*chunk, strict=True)
+            found = {
+                name: _values(name, cells, lines, part) for name, cells in zip(names, columns, strict=True)
+            }
+            files += found["file"]
+            status.extend(map(STATUSES.index, found["status"]))
+            methods.update(filter(None, found.get("method", ())))
+            for name in filter(found.__contains__, wanted):
+                column = numbers.setdefault(name, array("d"))
+                column.extend([math.nan if value is None else value for value in found[name]])
+    run = None if path == STREAM else read_run(path)
+    return ResultColumns(path, files, status, numbers, frozenset(methods), run)
+
+
+def _values(name: str, cells: Sequence[Any], lines: Sequence[str], path: str) -> list[Any]:
+    """Return the values of a column's cells; where one has none, raise the error of the first."""
+    try:
+        if _EMPTY.issuperset(cells):  # most columns of many results
+            return [READERS[name](None)] * len(cells)
+        return list(map(READERS[name], cells))
+    except (KeyError, ValueError, TypeError, OverflowError):
+        return [value_of(name, cell, f"{path}: {line}") for cell, line in zip(cells, lines, strict=True)]

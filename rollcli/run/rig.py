@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError
+from rollcli.files import results
 from rollcli.files.naming import listed, natural_key
-from rollcli.files.result_columns import ResultColumns, read_columns
-from rollcli.files.results import STATUSES, Result, parse_rows, pieces_of, read_run, run_path
+from rollcli.files.results import STATUSES, ResultColumns, parse_rows, pieces_of, read_run, run_path
 from rollcli.files.storage import is_stream, write_output
 from rollcli.files.stores.locations import base_name, is_remote
 from rollcli.messages import say
@@ -51,7 +51,7 @@ def _assessed(paths: Sequence[str], options: RigOptions) -> tuple[RigAssessment,
     UsageError
         Shards are not of one run, one is missing, or the rows are of several methods.
     """
-    parts = [read_columns(path, COLUMNS) for path in paths]
+    parts = [results.read_columns(path, COLUMNS) for path in paths]
     for part in parts:
         if not part.files:
             raise InputError(f"{part.path}: has no rows: there is nothing to assess")
@@ -78,7 +78,7 @@ def _joined(parts: Sequence[ResultColumns], name: str) -> NDArray[np.float64]:
     return np.concatenate([part.numbers.get(name, np.full(len(part.files), np.nan)) for part in parts])
 
 
-Part = Result | ResultColumns  # one of several that are put together
+Part = results.Result | ResultColumns  # one of several that are put together
 
 
 def order_of(parts: Sequence[Part]) -> tuple[NDArray[np.intp], list[str]]:

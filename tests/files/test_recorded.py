@@ -19,8 +19,15 @@ from rollcli.files import bounded, containers, encodings, locking, naming
 from rollcli.files.codecs import pictures
 from rollcli.files.formats import decode_image, decode_mask, decode_stored, encode_stored
 from rollcli.files.inputs import find_inputs, is_elsewhere, match_paths, pair_inputs
-from rollcli.files.result_columns import read_columns
-from rollcli.files.results import FURTHER, Row, column_types, format_header, format_row, parse_rows
+from rollcli.files.results import (
+    FURTHER,
+    Row,
+    column_types,
+    format_header,
+    format_row,
+    parse_rows,
+    read_columns,
+)
 from rollcli.files.search import IMAGE_ENDINGS, Search
 from rollcli.files.stores import locations
 from rollcli.rig.calibration import Calibration
@@ -113,9 +120,10 @@ def _columns(data):
     with folder_of([]):
         Path("x").write_bytes(data)
         found = _answer(read_columns, "x", ["roll_deg", "height_m"])
-    return (
-        found if isinstance(found, str) else [found.files, found.status, found.numbers, sorted(found.methods)]
-    )
+    if isinstance(found, str):
+        return found
+    numbers = {name: np.array(column) for name, column in found.numbers.items()}
+    return [found.files, np.array(found.status), numbers, sorted(found.methods)]
 
 
 def _matched(lefts, rights):

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from rollcli.errors import InputError
-from rollcli.files.result_columns import read_columns
 from rollcli.files.results import (
     STATUSES,
     Row,
@@ -17,6 +16,7 @@ from rollcli.files.results import (
     format_row,
     part_names,
     plain_values,
+    read_columns,
     read_result,
 )
 from rollcli.files.storage import write_bytes
