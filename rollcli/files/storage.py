@@ -21,7 +21,7 @@ from rollcli.files import atomic, bounded
 from rollcli.files.bounded import MOST_BYTES, too_large
 from rollcli.files.containers import file_of, read_member
 from rollcli.files.stores import objects
-from rollcli.files.stores.locations import WEB_SERVERS, is_url, public_name, scheme_of
+from rollcli.files.stores.locations import is_url, is_web_url, public_name
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -113,8 +113,12 @@ def read_frame(
     notes = _notes.get()
     state = "" if notes is None else state_of(location)  # before the bytes: a change amid them shows
     data: bytes | NDArray[Any]
-    if is_url(location):
-        data, state = _read_url(location, most)
+    if is_web_url(location):
+        from rollcli.files.stores.web import read_web_file  # urllib takes longer to load than all of this
+
+        data = read_web_file(location, most)
+    elif is_url(location):
+        data, state = objects.read_object(location, most)  # the tag is noted
     else:
         inside = read_member(location, name, most) if "#" in location else None
         data = inside if inside is not None else _read_file(location, name, most, begins)
@@ -159,15 +163,6 @@ def fetch_all(locations: Iterable[str], most: int = MOST_BYTES) -> dict[str, byt
     return dict(zip(every, atomic.in_threads(partial(read_bytes, most=most), every), strict=True))
 
 
-def _read_url(location: str, most: int) -> tuple[bytes, str]:
-    """Return the bytes, and the tag of an object."""
-    if scheme_of(location) in WEB_SERVERS:
-        from rollcli.files.stores.web import read_web_file  # urllib takes longer to load than all of this
-
-        return read_web_file(location, most), ""
-    return objects.read_object(location, most)
-
-
 def read_problem(url: str) -> str:
     """Say what keeps an object or a web file from being read, and probably others; empty where nothing does.
 
@@ -176,7 +171,7 @@ def read_problem(url: str) -> str:
     UsageError
         The scheme is not supported, or an extra is missing.
     """
-    if scheme_of(url) in WEB_SERVERS:
+    if is_web_url(url):
         from rollcli.files.stores.web import web_problem
 
         return web_problem(url)
@@ -191,7 +186,7 @@ def write_problem(folder: str) -> str:
     UsageError
         The scheme is not supported, or an extra is missing.
     """
-    return _READ_ONLY if scheme_of(folder) in WEB_SERVERS else objects.folder_problem(folder)
+    return _READ_ONLY if is_web_url(folder) else objects.folder_problem(folder)
 
 
 def write_bytes(location: str, data: bytes, *, durable: bool = False, owner: str = "") -> None:
@@ -212,11 +207,10 @@ def write_bytes(location: str, data: bytes, *, durable: bool = False, owner: str
     OutputError
         It cannot be written.
     """
-    if not is_url(location):
+    if _is_object(location):
+        objects.write_object(location, data, owner)
+    else:
         atomic.write_atomic(location, data, durable=durable)
-        return
-    _require_writable(location)
-    objects.write_object(location, data, owner)
 
 
 def create(location: str, data: bytes, owner: str = "", *, durable: bool = True) -> bool:
@@ -242,8 +236,7 @@ def create(location: str, data: bytes, owner: str = "", *, durable: bool = True)
     OutputError
         It cannot be written.
     """
-    if is_url(location):
-        _require_writable(location)
+    if _is_object(location):
         return objects.create_object(location, data, owner or hashlib.sha256(data).hexdigest())
     try:
         atomic.write_atomic(location, data, durable=durable, replaces=False)
@@ -263,7 +256,7 @@ def create(location: str, data: bytes, owner: str = "", *, durable: bool = True)
 def list_names(folder: str) -> list[str]:
     """Return the names of the files in a folder, or of the objects below a prefix; none if it is absent."""
     if is_url(folder):
-        if scheme_of(folder) in WEB_SERVERS:
+        if is_web_url(folder):
             return []  # a web server cannot be asked
         base = folder.rstrip("/") + "/"
         return [url.removeprefix(base) for url, *_ in objects.list_objects(base)]
@@ -280,8 +273,7 @@ def remove(location: str) -> None:
     OutputError
         It cannot be removed.
     """
-    if is_url(location):
-        _require_writable(location)
+    if _is_object(location):
         objects.remove_object(location)
         return
     with writing(location):
@@ -318,9 +310,11 @@ def _read_file(path: str, name: str, most: int = MOST_BYTES, begins: Beginning =
         raise InputError(f"{name}: cannot be read: {reason}", reason) from None
 
 
-def _require_writable(url: str) -> None:
-    if scheme_of(url) in WEB_SERVERS:
-        raise OutputError(f"{public_name(url)}: {_READ_ONLY}")
+def _is_object(location: str) -> bool:
+    """Tell whether what is written here is an object and no file; refuse what is on a web server."""
+    if is_web_url(location):
+        raise OutputError(f"{public_name(location)}: {_READ_ONLY}")
+    return is_url(location)
 
 
 def is_stream(name: str) -> bool:

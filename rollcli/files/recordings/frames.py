@@ -257,10 +257,8 @@ def _first_encodings(files: Sequence[str], topics: dict[str, Topic], images: set
     for path in files:
         for message in opened(path).messages(images):
             if message.topic not in found:
-                try:
+                with contextlib.suppress(InputError):  # the next one may be whole
                     found[message.topic] = messages.image_encoding(topics[message.topic], message.data, path)
-                except InputError:
-                    continue
             if len(found) == len(images):
                 return found
     return found

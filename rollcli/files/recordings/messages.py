@@ -17,11 +17,9 @@ from rollcli.files.codecs import pictures, png
 from rollcli.files.codecs.raw_map import require_decoded_fits, require_pixels
 from rollcli.files.recordings.bags import Topic
 
-DISPARITY, IMAGE, COMPRESSED = (
-    "stereo_msgs/DisparityImage",
-    "sensor_msgs/Image",
-    "sensor_msgs/CompressedImage",
-)
+DISPARITY = "stereo_msgs/DisparityImage"
+IMAGE = "sensor_msgs/Image"
+COMPRESSED = "sensor_msgs/CompressedImage"
 CAMERA_INFO = "sensor_msgs/CameraInfo"
 _ZSTD = b"\x28\xb5\x2f\xfd"
 _VIDEO_STARTS = (b"\0\0\1", b"\0\0\0\1")  # start codes of H.264 and H.265 [ITU-T H.264, annex B]
