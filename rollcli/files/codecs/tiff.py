@@ -299,10 +299,7 @@ def _nodata(page: Any) -> tuple[float, ...]:
 
 def _note(file: Any, name: str) -> str:
     """Return what to tell a user who gave several pages."""
-    try:
-        second = file.pages[1]
-    except IndexError:
-        return ""
-    if int(second.subfiletype) & _NOT_A_PAGE_OF_ITS_OWN:
-        return ""
-    return f"{name} holds several pages; the first is read"
+    with contextlib.suppress(IndexError):  # there is but one
+        if not int(file.pages[1].subfiletype) & _NOT_A_PAGE_OF_ITS_OWN:
+            return f"{name} holds several pages; the first is read"
+    return ""
