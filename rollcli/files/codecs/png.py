@@ -14,14 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, OutputError
-from rollcli.files.codecs.raw_map import (
-    COLOUR_REMEDY,
-    PICTURE_FLAGS,
-    Stored,
-    require_decoded_fits,
-    require_pixels,
-)
+from rollcli.files.codecs.raw_map import COLOUR_REMEDY, Stored, require_decoded_fits, require_pixels
 
+# a camera image as it lies in the file, grey or BGR: turning it by its EXIF tag would break rectification
+PICTURE_FLAGS = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
 _MOST = 4000  # bytes of it that are looked at
 _sink: int | None = None
 

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,9 +16,6 @@ _FLOAT32 = 4
 _MOST = 2**29  # bytes: 134 million pixels
 
 COLOUR_REMEDY = "a disparity map has one channel; photographs are given by --left and --right"
-
-# a camera image as it lies in the file, grey or BGR: turning it by its EXIF tag would break rectification
-PICTURE_FLAGS = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
 
 
 @dataclass(frozen=True)
