@@ -20,7 +20,7 @@ from rollcli.errors import InputError, UsageError, as_usage, reading
 from rollcli.files.atomic import is_file, is_folder
 from rollcli.files.bounded import most_unpacked, state_of, too_large
 from rollcli.files.naming import natural_key, split_position
-from rollcli.files.stores.locations import is_url
+from rollcli.files.stores.locations import is_url, require_local
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -88,9 +88,10 @@ def bag_files(location: str) -> list[str]:
     Raises
     ------
     UsageError
-        They are compressed as whole files.
+        They are compressed as whole files, or in a store.
     """
     if location.lower().endswith(BAGS) and not is_folder(location):
+        require_local(location)
         return [location]
     if not is_file(os.path.join(location, "metadata.yaml")):  # noqa: PTH118
         return []

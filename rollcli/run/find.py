@@ -11,16 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple, overload
 from rollcli.errors import InputError, UsageError
 from rollcli.extras import require_extra
 from rollcli.files.atomic import is_file
-from rollcli.files.containers import (
-    BAGS,
-    VIDEOS,
-    bag_files,
-    file_of,
-    frame_name,
-    is_archive,
-    is_rest,
-    is_video,
-)
+from rollcli.files.containers import VIDEOS, bag_files, file_of, frame_name, is_archive, is_rest, is_video
 from rollcli.files.inputs import Manifest, find_inputs, named_input, pair_inputs
 from rollcli.files.naming import Input, gathered
 from rollcli.files.search import IMAGE_ENDINGS, LEAVE_NONE, MAP_ENDINGS, Search, is_place, objects_behind
@@ -393,17 +384,9 @@ def _frames_of(left: Input, right: Input, layout: Layout | None) -> list[tuple[I
     """List the frames of two videos, or of one that holds both views; images are a pair themselves."""
     if not (is_video(left.location) or is_video(right.location)):
         return [(left, right)]
-    for each in (left, right):
-        _require_local(each.location)
     from rollcli.files.recordings.video import frames_of
 
     return frames_of(left, right, layout)
-
-
-def _require_local(location: str) -> None:
-    """Refuse a recording in a store, which can only be read from its start to its end."""
-    if is_url(location):
-        raise UsageError(f"{public_name(location)}: recordings are read from local disk: download it first")
 
 
 def _bag_pairs(named: Named, make: "_FrameMaker") -> list[Frame]:
@@ -432,9 +415,7 @@ def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
     """
     bags = []
     for name in dict.fromkeys(given.inputs):
-        if name.lower().endswith(BAGS):
-            _require_local(name)
-        if files := [] if is_url(name) else bag_files(name):
+        if files := bag_files(name):
             bags.append((name, files))
     if bags and (len(bags) < len(set(given.inputs)) or given.files_from is not None):
         raise UsageError(f"{bags[0][0]}: is a bag: give bags and other inputs in runs of their own")

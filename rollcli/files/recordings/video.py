@@ -24,6 +24,7 @@ from rollcli.files.bounded import state_of
 from rollcli.files.codecs.pictures import half_size
 from rollcli.files.codecs.raw_map import require_decoded_fits
 from rollcli.files.naming import Input, gathered
+from rollcli.files.stores.locations import require_local
 
 _BOXES = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"styp")  # that MP4 and MOV begin with
 _EBML, _SEGMENT = 0x1A45DFA3, 0x18538067  # Matroska's
@@ -71,9 +72,11 @@ def frames_of(left: Input, right: Input, layout: str | None) -> list[tuple[Input
     Raises
     ------
     UsageError
-        A video cannot be opened, has no frame, or has one that cannot be halved; or two differ in size; or in
-        length, and neither is cut off.
+        A video is in a store, cannot be opened, has no frame, or has one that cannot be halved; or two differ
+        in size; or in length, and neither is cut off.
     """
+    for each in (left, right):
+        require_local(each.location)
     one = _known(left, decode=layout is None)
     if layout is not None:
         with as_usage():

@@ -84,6 +84,17 @@ def is_remote(location: str) -> bool:
     return share or is_url(location)
 
 
+def require_local(location: str) -> None:
+    """Refuse a recording in a store, which can only be read from its start to its end.
+
+    Raises
+    ------
+    UsageError
+    """
+    if is_url(location):
+        raise UsageError(f"{public_name(location)}: recordings are read from local disk: download it first")
+
+
 def public_name(location: str) -> str:
     """Return a location as messages, rows and records show it: without passwords and signatures."""
     if not is_url(location):
