@@ -306,6 +306,9 @@ def test_python_iterates_the_frames_of_a_video(tmp_path, drive):
         np.testing.assert_array_equal(each.right, right)
     with pytest.raises(UsageError, match="is a video: give side_by_side"):
         list(package.open_recording(path))
+    for elsewhere in ("s3://bucket/a.avi", "s3://bucket/a.mcap"):
+        with pytest.raises(UsageError, match="recordings are read from local disk: download it first"):
+            list(package.open_recording(elsewhere, side_by_side="left-right"))
     path.write_bytes(path.read_bytes()[:-20_000])
     with pytest.raises(InputError, match="is cut off"):
         list(package.open_recording(path, side_by_side="left-right"))
