@@ -3,6 +3,7 @@
 import shutil
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -140,7 +141,8 @@ def estimate(ctx: click.Context, /, **records: Any) -> None:
     result = options.result
     resume = result.resume or result.update
     resume, overwrite = one_start(ctx, resume=resume, overwrite=options.running.overwrite)
-    options = options._replace(
+    options = replace(
+        options,
         result=result._replace(resume=resume, update=resume and result.update),
         running=options.running._replace(overwrite=overwrite),
     )

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from rollcli.run.options import EncodingOptions, FrameOptions, InputOptions, RegionOptions, RunningOptions
+from rollcli.run.options import FramesOptions, RegionOptions, RunningOptions, Written
 
 
 @dataclass(frozen=True)
@@ -64,20 +64,21 @@ class ExperimentOptions:
         return tuple(first + step * k for k in range(int((last - first) / step + 1e-9) + 1))
 
 
-@dataclass(frozen=True)
-class PaperOptions:
+@dataclass(frozen=True, kw_only=True)
+class PaperOptions(FramesOptions):
     """Everything that `rollcli evaluate paper` was asked."""
 
-    inputs: InputOptions
-    encoding: EncodingOptions
-    region: RegionOptions
     experiments: ExperimentOptions
-    running: RunningOptions
 
     @property
-    def frame(self) -> FrameOptions:
-        """How a map is read."""
-        return FrameOptions(encoding=self.encoding, region=self.region)
+    def writes(self) -> tuple[Written, ...]:
+        """No file of each map."""
+        return ()
+
+    @property
+    def folders(self) -> list[str]:
+        """Where the page and the tables go."""
+        return [self.experiments.output]
 
     @property
     def has_region(self) -> bool:

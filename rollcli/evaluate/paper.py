@@ -12,7 +12,7 @@ from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.extras import require_extra
 from rollcli.files.inputs import stem_of
 from rollcli.files.storage import write_output
-from rollcli.run.find import Named, map_frames
+from rollcli.run.find import find_frames
 from rollcli.run.frame import Frame
 from rollcli.run.outputs import listed_only
 from rollcli.run.progress import Progress
@@ -50,8 +50,7 @@ def run_paper(options: PaperOptions) -> ExitStatus:
     require_extra("report", "the page of charts")
     if options.encoding.encoding == "depth":
         raise UsageError("--encoding depth: the experiments are made on disparity maps, not on depth maps")
-    folder, running = options.experiments.output, options.running
-    frames = map_frames(Named(options.inputs, running.quiet, region=options.region, skip=[folder]))
+    frames, folder = find_frames(options), options.experiments.output
     truth = _known_angles(frames, options)
     kind = options.experiments.figure
     names = [f"{name}.{kind}" for name in FIGURES] if kind is not None else []

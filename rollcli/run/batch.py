@@ -25,7 +25,7 @@ from rollcli.files.stores.locations import is_url, public_name
 from rollcli.files.stores.objects import object_owner
 from rollcli.run.frame import Frame, FrameResult, ReadAs
 from rollcli.run.options import FrameOptions
-from rollcli.run.outputs import local_images
+from rollcli.run.outputs import local_files
 from rollcli.run.progress import Figures
 from rollcli.run.result_file import inputs_line, part_inputs_path
 from rollcli.run.workers.chunks import Span
@@ -222,13 +222,13 @@ def _write_parts(
     frames: Span[Frame], status: bytes, lines: Sequence[bytes], notes: Sequence[bytes], options: BatchOptions
 ) -> int:
     """Write the parts that the lines fill, if they begin with one; return how many lines that were."""
-    parts, written, images, root = options.parts, 0, options.frame.images, options.frame.root
+    parts, written, (writes, root) = options.parts, 0, (options.frame.writes, options.frame.root)
     while parts and frames.first % parts.rows == 0 and written < len(lines):
         first = frames.first + written
         end = written + min(parts.rows, parts.frames - first)
         if end > len(lines):
             break
-        sync_files(local_images(frames[written:end], status[written:end], images, root))
+        sync_files(local_files(frames[written:end], status[written:end], writes, root))
         parts.write(parts.numbers[first // parts.rows], lines[written:end], notes[written:end])
         written = end
     return written

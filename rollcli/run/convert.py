@@ -1,31 +1,20 @@
 """`derotate`, `vdisparity`, `heights` and `disparity`: each frame becomes files of its own."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
-from functools import partial
 
 from rollcli.errors import ExitStatus, UsageError
 from rollcli.extras import require_extra
-from rollcli.files.atomic import remove_leftovers
 from rollcli.files.results import Row
 from rollcli.messages import say
 from rollcli.run import outputs
-from rollcli.run.find import Named, check_depth, check_first_size, map_frames, pair_frames
-from rollcli.run.frame import Frame, FrameResult, failed_frame
-from rollcli.run.options import (
-    ConvertOptions,
-    DerotateOptions,
-    DisparityOptions,
-    FrameOptions,
-    HeightsOptions,
-    InputOptions,
-    VDisparityOptions,
-)
-from rollcli.run.plan import decoder_for, workers_for
+from rollcli.run.find import check_depth, check_first_size, find_frames
+from rollcli.run.frame import Frame
+from rollcli.run.frame_work import work_on, workers_for
+from rollcli.run.options import ConvertOptions, DerotateOptions, HeightsOptions, VDisparityOptions
 from rollcli.run.progress import Progress
 from rollcli.run.result_rows import rows_of
-from rollcli.run.workers.chunks import Work
 from rollcli.run.workers.interrupt import stop_on_signals
 from rollcli.run.workers.tasks import require_scheduler, run_tasks
 
@@ -41,19 +30,12 @@ def run_conversion(options: ConvertOptions) -> ExitStatus:
     running = options.running
     frames = _plan(options)
     if running.dry_run:
-        outputs.list_files((each.reads(), outputs.paths_of(each, options)) for each in frames)
+        outputs.list_files((each.reads(), outputs.every_path(each, options.writes)) for each in frames)
         return ExitStatus.DONE
     require_scheduler(running.scheduler)
     progress = Progress(len(frames), running, options.encoding, statuses=("ok",))
-    told = replace(options, inputs=InputOptions())  # which may be long
-    work = Work(
-        partial(_convert, options=told, read=options.frame),  # made here, where relative paths start
-        partial(_lost, options=told),
-        partial(_remove_leftovers, options=told),
-        prepare=decoder_for(frames, options.frame),
-    )
+    work, workers = work_on(frames, options.frame), workers_for(frames, options)
     work.clear(frames)
-    workers = workers_for(frames, running, [options.output])
     with stop_on_signals() as stop, progress, closing(run_tasks(frames, work, stop, workers)) as results:
         for result in results:
             progress.add(result)
@@ -67,7 +49,9 @@ def run_conversion(options: ConvertOptions) -> ExitStatus:
 def _plan(options: ConvertOptions) -> list[Frame]:
     """Find the frames, give each its row, and check what would be read and written."""
     _check_options(options)
-    frames = _find_frames(options)
+    frames = find_frames(options)
+    if not (options.paired or isinstance(options, DerotateOptions)):
+        check_depth(frames, options.encoding)
     rows = _find_rows(frames, options)
     say(*check_first_size(frames, options.frame)[0])
     wanted = [
@@ -75,11 +59,11 @@ def _plan(options: ConvertOptions) -> list[Frame]:
         for frame, row in zip(frames, rows, strict=True)
         if row is None or row.status != "suspect" or not options.skip_suspect
     ]
-    outputs.check_one_owner((each, outputs.paths_of(each, options)) for each in wanted)
-    outputs.check_places(wanted, [options.output])
+    outputs.check_one_owner((each, outputs.every_path(each, options.writes)) for each in wanted)
+    outputs.check_places(wanted, options.folders)
     outputs.check_writes(
         [path for each in wanted for path in each.reads()],
-        [path for each in wanted for path in outputs.paths_of(each, options)],
+        list(outputs.files_of(wanted, options.writes)),
         overwrite=options.running.overwrite,
     )
     return wanted
@@ -102,17 +86,6 @@ def _check_options(options: ConvertOptions) -> None:
             raise UsageError("--from is for --figure: a picture shows the map as it is")
 
 
-def _find_frames(options: ConvertOptions) -> Sequence[Frame]:
-    skip, quiet = [folder for folder, _ in options.writes], options.running.quiet
-    named = Named(options.inputs, quiet, calibration=options.calibration, skip=skip)
-    if isinstance(options, DisparityOptions):
-        return pair_frames(named._replace(pairs=options.pairs, topics=options.topics))
-    frames = map_frames(named)
-    if not isinstance(options, DerotateOptions):
-        check_depth(frames, options.encoding)
-    return frames
-
-
 def _find_rows(frames: Sequence[Frame], options: ConvertOptions) -> Sequence[Row | None]:
     if options.result is None:
         return [None] * len(frames)
@@ -126,18 +99,3 @@ def _find_rows(frames: Sequence[Frame], options: ConvertOptions) -> Sequence[Row
             "not camera heights"
         )
     return rows
-
-
-def _remove_leftovers(frames: Iterable[Frame], options: ConvertOptions) -> None:
-    remove_leftovers(path for frame in frames for path in outputs.paths_of(frame, options))
-
-
-def _convert(frame: Frame, options: ConvertOptions, read: FrameOptions) -> FrameResult:
-    from rollcli.run.images import convert_frame  # loads NumPy: only on a worker
-
-    return convert_frame(frame, options, read)
-
-
-def _lost(frame: Frame, reason: str, options: ConvertOptions) -> FrameResult:
-    outputs.write_outputs({}, outputs.paths_of(frame, options), replaces=options.running.overwrite)
-    return failed_frame(frame, reason)

@@ -2,7 +2,7 @@
 
 import contextlib
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from itertools import chain, islice
 
@@ -10,37 +10,15 @@ from rollcli.errors import ExitStatus, OutputError, WorkerError
 from rollcli.files.stores.locations import is_url
 from rollcli.run.batch import Batch, BatchOptions, Step, join_results, line_form
 from rollcli.run.find import calibration_files, calibration_notes
-from rollcli.run.frame import Frame, FrameResult, failed_frame
-from rollcli.run.options import EstimateOptions, FrameOptions
-from rollcli.run.outputs import every_path, list_files, remove_image_leftovers, write_outputs
-from rollcli.run.plan import Plan, decoder_for, make_plan, workers_for
+from rollcli.run.frame_work import work_on, workers_for
+from rollcli.run.options import EstimateOptions
+from rollcli.run.outputs import every_path, list_files
+from rollcli.run.plan import Plan, make_plan
 from rollcli.run.progress import Progress
 from rollcli.run.result import kept_of, open_output
 from rollcli.run.resume import Output
-from rollcli.run.workers.chunks import Work
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
 from rollcli.run.workers.tasks import require_scheduler, run_joined
-
-
-def estimate_frame(frame: Frame, options: FrameOptions) -> FrameResult:
-    """Estimate the roll of a frame, on a worker."""
-    from rollcli.run.estimate_frame import run_frame
-
-    return run_frame(frame, options)
-
-
-def lost_frame(frame: Frame, reason: str, options: FrameOptions) -> FrameResult:
-    """Make the row of a frame whose worker died, and remove its images of an earlier run."""
-    paths = every_path(frame, options.images)
-    write_outputs({}, paths, replaces=options.replaces, retry_of=options.retry_of)
-    return failed_frame(frame, reason)
-
-
-def clear_frames(frames: Iterable[Frame], options: FrameOptions) -> None:
-    """Remove the halves of images that a worker left which died amid one of these frames."""
-    if not options.retry_of:  # they go when the row is written, with marks that are needed until then
-        remove_image_leftovers(frames, options.images)
-
 
 _NOTES = 3  # on how calibrations were read; the record of the run has those of more files
 
@@ -62,8 +40,8 @@ def run_estimate(options: EstimateOptions, resume_command: str = "") -> ExitStat
     plan = make_plan(options)
     if not options.running.dry_run:
         return _run(plan, resume_command)
-    frames, images = chain.from_iterable(step.frames for step in kept_of(plan).steps()), options.images
-    of_frames = ((frame.reads(), every_path(frame, images)) for frame in frames)
+    frames, writes = chain.from_iterable(step.frames for step in kept_of(plan).steps()), options.writes
+    of_frames = ((frame.reads(), every_path(frame, writes)) for frame in frames)
     list_files(chain([(calibration_files(options.calibration), ())], of_frames, [((), plan.files)]))
     return ExitStatus.DONE
 
@@ -140,17 +118,9 @@ def _results(step: Step, plan: Plan, output: Output, stop: Stop) -> Iterator[Ite
         fail_fast=options.result.fail_fast,
         parts=parts,
     )
-    work = Work(
-        partial(estimate_frame, options=told),
-        partial(lost_frame, options=told),
-        partial(clear_frames, options=told),
-        partial(join_results, options=rows),
-        lambda: record.read_as,
-        parts.rows if parts else 1,
-        decoder_for(frames, told),
-    )
-    folders = [folder for _, folder in options.images.folders()]
-    workers = workers_for(frames, options.running, folders, [parts.output] if parts else [])
+    join, unit = partial(join_results, options=rows), parts.rows if parts else 1
+    work = work_on(frames, told, join=join, tell=lambda: record.read_as, unit=unit)
+    workers = workers_for(frames, options, [parts.output] if parts else [])
     try:
         with contextlib.closing(run_joined(frames, work, stop, workers)) as results:
             yield results

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, NamedTuple, overload
+from typing import TYPE_CHECKING, overload
 
 from rollcli.errors import InputError, UsageError
 from rollcli.extras import require_extra
@@ -21,15 +21,7 @@ from rollcli.messages import say
 from rollcli.rig.calibration import Calibration, CalibrationOptions, require_calibration
 from rollcli.rig.read_calibration import MAX_BYTES, parse_calibration
 from rollcli.run.frame import Frame
-from rollcli.run.options import (
-    EncodingOptions,
-    FrameOptions,
-    InputOptions,
-    Layout,
-    PairOptions,
-    RegionOptions,
-    TopicOptions,
-)
+from rollcli.run.options import EncodingOptions, FrameOptions, FramesOptions, InputOptions, Layout
 
 if TYPE_CHECKING:
     from rollcli.files.recordings.frames import BagFrames
@@ -240,42 +232,29 @@ def _read(
     return parse_calibration(files, given)
 
 
-class Named(NamedTuple):
-    """What a user named: where frames are, and what belongs to them.
-
-    Attributes
-    ----------
-    inputs, pairs, topics, region, calibration
-        See `EstimateOptions`.
-    quiet : bool
-        Whether no line says what the folders hold beside what is read.
-    skip : sequence of str
-        The output folders, which are not searched.
-    """
-
-    inputs: InputOptions
-    quiet: bool
-    pairs: PairOptions = PairOptions()
-    topics: TopicOptions = TopicOptions()
-    region: RegionOptions = RegionOptions()
-    calibration: CalibrationOptions = CalibrationOptions()
-    skip: Sequence[str] = ()
-
-
-def map_frames(named: Named) -> Sequence[Frame]:
-    """Make a frame of each map.
+def find_frames(options: FramesOptions) -> Sequence[Frame]:
+    """Make a frame of each map, or of each stereo pair, that a user named.
 
     Raises
     ------
     UsageError
-        Nothing is named or found, a mask or a calibration is missing, or names are not sorted that should be.
+        Nothing is named or found, pairs are named in several ways, an image has no partner, a mask or a
+        calibration is missing, or names are not sorted that should be.
     """
-    given = named.inputs
+    if not options.paired:
+        return _map_frames(options)
+    if options.inputs.sorted:
+        raise UsageError("--sorted takes a list of maps, not of pairs")
+    return _pair_frames(options)
+
+
+def _map_frames(options: FramesOptions) -> Sequence[Frame]:
+    given = options.inputs
     if given.sorted:
-        return _sorted_frames(named)
+        return _sorted_frames(options)
     if not (given.inputs or given.files_from):
         raise UsageError("no input: name maps (files, folders, patterns, or - for a list on stdin)")
-    make = _FrameMaker(named)
+    make = _FrameMaker(options)
     if bags := _bags(given):
         from rollcli.files.recordings.frames import maps_of_bag
 
@@ -283,7 +262,7 @@ def map_frames(named: Named) -> Sequence[Frame]:
         return _bag_frames(found_maps, make, given.every)
     if given.topic is not None:
         raise UsageError("--topic is of a bag (.bag, .db3, .mcap or a rosbag2 folder), and none is given")
-    with _search(named, MAP_ENDINGS, maps=True) as search:
+    with _search(options, MAP_ENDINGS, maps=True) as search:
         found = find_inputs(given.inputs, search, files_from=given.files_from)
     if video := next((each.name for each in found if is_video(each.location)), None):
         raise UsageError(
@@ -294,24 +273,24 @@ def map_frames(named: Named) -> Sequence[Frame]:
 
 
 @contextlib.contextmanager
-def _search(named: Named, endings: tuple[str, ...], *, maps: bool = False) -> Iterator[Search]:
+def _search(options: FramesOptions, endings: tuple[str, ...], *, maps: bool = False) -> Iterator[Search]:
     """Say, once the search is over, what it has noted."""
-    given = named.inputs
-    search = Search(endings, given.recursive, given.include, given.exclude, named.skip, maps)
+    given = options.inputs
+    search = Search(endings, given.recursive, given.include, given.exclude, options.folders, maps)
     yield search
-    if not named.quiet:
+    if not options.running.quiet:
         say(*dict.fromkeys(search.notes))
 
 
-def _sorted_frames(named: Named) -> "SortedFrames":
-    given = named.inputs
+def _sorted_frames(options: FramesOptions) -> "SortedFrames":
+    given = options.inputs
     if given.inputs or given.files_from is None or given.files_from == "-" or is_url(given.files_from):
         raise UsageError("--sorted takes the names of one file on disk: give --files-from FILE and no input")
     if given.recursive or given.include or given.exclude:
         raise UsageError("--sorted takes the names as they are: leave out --recursive, --include, --exclude")
     manifest = Manifest(given.files_from)
     places = range(0, len(manifest), given.every)
-    return SortedFrames(manifest, _FrameMaker(named), places)
+    return SortedFrames(manifest, _FrameMaker(options), places)
 
 
 class SortedFrames(Sequence[Frame]):
@@ -339,16 +318,9 @@ class SortedFrames(Sequence[Frame]):
         return SortedFrames(self._manifest, self._make, self._places[index])
 
 
-def pair_frames(named: Named) -> list[Frame]:
-    """Make a frame of each stereo pair: of two places, of topics of bags, or of images that hold both views.
-
-    Raises
-    ------
-    UsageError
-        Pairs are named in no way, or in several; a side is missing, an image has no partner, or a mask or a
-        calibration is missing.
-    """
-    given, pairs, topics = named.inputs, named.pairs, named.topics
+def _pair_frames(options: FramesOptions) -> list[Frame]:
+    """Make a frame of each pair: of two places, of topics of bags, or of images that hold both views."""
+    given, pairs, topics = options.inputs, options.pairs, options.topics
     has_inputs = bool(given.inputs or given.files_from)
     sides, views = (pairs.left, pairs.right), (topics.left_topic, topics.right_topic)
     ways = [any(sides), any(views), pairs.side_by_side is not None]
@@ -357,11 +329,11 @@ def pair_frames(named: Named) -> list[Frame]:
             "name pairs in one way: --left and --right alone; or INPUTS, with --left-topic and --right-topic "
             "for bags, or --side-by-side for images and videos that hold both views"
         )
-    make = _FrameMaker(named)
+    make = _FrameMaker(options)
     if any(views):
-        return _bag_pairs(named, make)
+        return _bag_pairs(options, make)
     videos = VIDEOS if pairs.side_by_side is not None else ()
-    with _search(named, (*IMAGE_ENDINGS, *videos)) as search:
+    with _search(options, (*IMAGE_ENDINGS, *videos)) as search:
         if pairs.side_by_side is not None:
             found = find_inputs(given.inputs, search, files_from=given.files_from)
             matched = [(each, each) for each in found]
@@ -389,20 +361,20 @@ def _frames_of(left: Input, right: Input, layout: Layout | None) -> list[tuple[I
     return frames_of(left, right, layout)
 
 
-def _bag_pairs(named: Named, make: "_FrameMaker") -> list[Frame]:
-    left, right = named.topics.left_topic, named.topics.right_topic
+def _bag_pairs(options: FramesOptions, make: "_FrameMaker") -> list[Frame]:
+    left, right = options.topics.left_topic, options.topics.right_topic
     if left is None or right is None:
         raise UsageError("--left-topic and --right-topic are given together")
-    bags = _bags(named.inputs)
+    bags = _bags(options.inputs)
     if not bags:
         raise UsageError(
             "--left-topic and --right-topic are of a bag: name a .bag, .db3, .mcap or rosbag2 folder"
         )
     from rollcli.files.recordings.frames import pairs_of_bag
 
-    tolerance = round(named.topics.sync_tolerance * 1e6)
+    tolerance = round(options.topics.sync_tolerance * 1e6)
     found = [pairs_of_bag(files, name, left, right, tolerance) for name, files in bags]
-    return _bag_frames(found, make, named.inputs.every)
+    return _bag_frames(found, make, options.inputs.every)
 
 
 def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
@@ -441,9 +413,9 @@ def _bag_frames(bags: "Iterable[BagFrames]", make: "_FrameMaker", every: int) ->
 class _FrameMaker:
     """Makes frames, with the masks and calibrations that were named: one for all, or one of each stem."""
 
-    def __init__(self, named: Named) -> None:
-        self.calibrations, self.quiet = Calibrations(named.calibration), named.quiet
-        self._masks = Masks(named.region.mask)
+    def __init__(self, options: FramesOptions) -> None:
+        self.calibrations, self.quiet = Calibrations(options.calibration), options.running.quiet
+        self._masks = Masks(options.region.mask)
 
     def frame(self, left: Input, right: Input | None = None, calibration: Calibration | None = None) -> Frame:
         """Make the frame of a map, or of the views of a pair; `calibration` is that of its bag."""

@@ -1,7 +1,7 @@
 """Make the files of a frame, on a worker: the images beside a row, and what a conversion writes."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -23,9 +23,8 @@ from rollcli.pictures.vdisparity import draw_v_disparity, middle_row, profile, r
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import horizon_row
 from rollcli.run.diagnosis import looks_like
-from rollcli.run.frame import Frame, FrameResult
+from rollcli.run.frame import Frame
 from rollcli.run.options import (
-    ConvertOptions,
     DerotateOptions,
     DisparityOptions,
     EncodingOptions,
@@ -33,8 +32,8 @@ from rollcli.run.options import (
     HeightsOptions,
     VDisparityOptions,
 )
-from rollcli.run.outputs import paths_of, possible_paths, roomy_path, write_outputs
-from rollcli.run.read import Source, guarded, read_source
+from rollcli.run.outputs import possible_paths, roomy_path
+from rollcli.run.read import Source
 
 TOO_LARGE_FOR_PNG = f"written as TIFF: a disparity is above the {KITTI_TOP:.0f} px of a KITTI PNG"
 
@@ -107,13 +106,17 @@ class Pictured:
 def encode_images(frame: Frame, pictured: Pictured) -> tuple[dict[str, bytes], str]:
     """Make the images that were requested, by their paths, and what the row should say of them."""
     images, note = {}, ""
-    for kind, paths in possible_paths(frame, pictured.options.images):
-        planned = pictured.options.at(paths[0])
-        target, data = getattr(pictured, kind.name)(planned)
+    for kind, planned in _usual_paths(frame, pictured.options).items():
+        target, data = getattr(pictured, kind)(planned)
         images[target] = data
         if target != planned:
             note = TOO_LARGE_FOR_PNG
     return images, note
+
+
+def _usual_paths(frame: Frame, options: FrameOptions) -> dict[str, str]:
+    """Name the files of a frame, by their kinds."""
+    return {kind: options.at(usual) for kind, (usual, *_) in possible_paths(frame, options.writes)}
 
 
 def encode_turned(
@@ -150,37 +153,40 @@ def encode_heights(heights: NDArray[np.float32], save_as: str, unit: str) -> byt
     return encode_tiff(heights, description=f"height over the road, {unit}")
 
 
-_Made = tuple[dict[str, bytes], dict[str, str]]  # files by their paths, and warnings by their codes
+Made = tuple[Row, dict[str, bytes], dict[str, str]]  # of a frame; its files by path, and warnings by code
+_Files = tuple[dict[str, bytes], dict[str, str]]  # files by path, and warnings by code
 
 
-def convert_frame(frame: Frame, options: ConvertOptions, read: FrameOptions) -> FrameResult:
-    """Read a frame and write the files that its command makes of it, each whole or not at all."""
-    paths = [read.at(path) for path in paths_of(frame, options)]
-    files: dict[str, bytes] = {}
+def require_angle(frame: Frame, options: FrameOptions) -> None:
+    """Refuse a frame whose row in the result that a conversion is given has no angle.
 
-    def work() -> FrameResult:
-        if frame.row is not None and frame.row.map_roll_deg is None:
-            raise InputError(f"{frame.file}: has no angle in {options.result}")
-        source = read_source(frame, read)
-        made, warnings = _MAKERS[type(options)](source, frame, options, paths)
-        files.update(made)
-        row = Row(frame.file, frame.right_file, "ok", **source.alignment)
-        return FrameResult(row, source.encoding, {**source.doubts, **warnings}, source.searched)
-
-    result = guarded(frame, work)
-    write_outputs(files, paths, replaces=options.running.overwrite)
-    return result
+    Raises
+    ------
+    InputError
+    """
+    if options.convert is not None and frame.row is not None and frame.row.map_roll_deg is None:
+        raise InputError(f"{frame.file}: has no angle in {options.convert.result}")
 
 
-def _rotated(source: Source, of: Frame, options: DerotateOptions, paths: Sequence[str]) -> _Made:
+def converted(frame: Frame, source: Source, options: FrameOptions) -> Made:
+    """Make the files that a conversion makes of a frame."""
+    make = _MAKERS[type(options.convert)]
+    files, warnings = make(source, frame, options.convert, _usual_paths(frame, options))
+    row = Row(frame.file, frame.right_file, "ok", **source.alignment)
+    return row, files, {**source.doubts, **warnings}
+
+
+def _rotated(source: Source, of: Frame, options: DerotateOptions, paths: Mapping[str, str]) -> _Files:
     """Turn the map, and say where pixels go."""
     assert source.stored is not None  # a map, not a pair
     roll = math.radians((options.roll_deg if of.row is None else of.row.map_roll_deg) or 0.0)
     turned = encode_turned(source.stored, roll, source.encoding, options.encoding, expand=options.expand)
-    files = [turned, _matrix_text(source.disparity.shape, roll, options.expand)]
+    files = {paths["derotated"]: turned}
+    if options.save_matrix:
+        files[paths["matrix"]] = _matrix_text(source.disparity.shape, roll, options.expand)
     # its stored numbers stay as they are, and may be too large for pixels
     warnings = {code: text for code, text in source.warnings.items() if code != "beyond"}
-    return dict(zip(paths, files, strict=False)), warnings
+    return files, warnings
 
 
 def _matrix_text(shape: tuple[int, ...], roll: float, expand: bool) -> bytes:
@@ -194,7 +200,7 @@ def _matrix_text(shape: tuple[int, ...], roll: float, expand: bool) -> bytes:
     return "\n".join([*lines, ""]).encode()
 
 
-def _counted(source: Source, of: Frame, options: VDisparityOptions, paths: Sequence[str]) -> _Made:
+def _counted(source: Source, of: Frame, options: VDisparityOptions, paths: Mapping[str, str]) -> _Files:
     """Draw the v-disparity image of the map, and count for it; or draw the figure of both."""
     counting: dict[str, Any] = {"bins": options.bins, "max_disparity": options.max_disparity}
     if options.figure is not None:
@@ -203,7 +209,7 @@ def _counted(source: Source, of: Frame, options: VDisparityOptions, paths: Seque
         road: Row | RollEstimate = of.row or estimate_roll(source.disparity)
         theta = math.radians(road.map_roll_deg or 0.0) if isinstance(road, Row) else road.theta
         figure = v_disparity_figure(source.disparity, theta, road.alpha, options.figure, **counting)
-        return {paths[0]: figure}, dict(source.warnings)
+        return {paths["vdisparity"]: figure}, dict(source.warnings)
     histogram = v_disparity(source.disparity, **counting)
     estimate = _sure_estimate(source)
     curve, horizon, likeness = None, None, ""
@@ -214,10 +220,10 @@ def _counted(source: Source, of: Frame, options: VDisparityOptions, paths: Seque
         if (calibration := source.calibrated(of.calibration)) is not None:
             y = horizon_row(estimate.tangent, calibration)
             horizon = None if y is None else middle_row(y, estimate.theta, estimate.width)
-    files = [encode_png(draw_v_disparity(histogram, curve, horizon=horizon))]
+    files = {paths["vdisparity"]: encode_png(draw_v_disparity(histogram, curve, horizon=horizon))}
     if options.counts:
-        files.append(encode_stored(histogram.counts, "tiff"))
-    return dict(zip(paths, files, strict=True)), {**source.warnings, likeness: likeness}
+        files[paths["counts"]] = encode_stored(histogram.counts, "tiff")
+    return files, {**source.warnings, likeness: likeness}
 
 
 def _sure_estimate(source: Source) -> RollEstimate | None:
@@ -229,7 +235,9 @@ def _sure_estimate(source: Source) -> RollEstimate | None:
     return estimate if estimate.status == "ok" else None
 
 
-def _heights_of_row(source: Source, frame: Frame, options: HeightsOptions, paths: Sequence[str]) -> _Made:
+def _heights_of_row(
+    source: Source, frame: Frame, options: HeightsOptions, paths: Mapping[str, str]
+) -> _Files:
     """Measure the heights of the map over the road of its row, and draw them if that was requested."""
     height, width = source.disparity.shape
     calibration = source.calibrated(frame.calibration)
@@ -242,22 +250,23 @@ def _heights_of_row(source: Source, frame: Frame, options: HeightsOptions, paths
             "name the result of these maps"
         )
     heights, unit = heights_over(source.disparity, road, calibration), unit_of(calibration)
-    files = [encode_heights(heights, options.save_as, unit)]
+    files = {paths["heights"]: encode_heights(heights, options.save_as, unit)}
     if options.preview is not None:
-        files.append(encode_png(draw_heights(heights, options.heights_range, unit)))
-    return dict(zip(paths, files, strict=True)), dict(source.warnings)
+        files[paths["preview"]] = encode_png(draw_heights(heights, options.heights_range, unit))
+    return files, dict(source.warnings)
 
 
-def _matched(source: Source, _: Frame, options: DisparityOptions, paths: Sequence[str]) -> _Made:
+def _matched(source: Source, _: Frame, options: DisparityOptions, paths: Mapping[str, str]) -> _Files:
     """Encode the disparity map of the pair, and draw it if that was requested."""
-    path, data = encode_computed(paths[0], source.shown, options.save_as, source.text)
+    planned = paths["disparity"]
+    path, data = encode_computed(planned, source.shown, options.save_as, source.text)
     files = {path: data}
     if options.preview is not None:
-        files[paths[-1]] = encode_png(draw_preview(source.shown))
-    return files, {"too large": "" if path == paths[0] else TOO_LARGE_FOR_PNG}
+        files[paths["preview"]] = encode_png(draw_preview(source.shown))
+    return files, {"too large": "" if path == planned else TOO_LARGE_FOR_PNG}
 
 
-_MAKERS: dict[type, Callable[..., _Made]] = {
+_MAKERS: dict[type, Callable[..., _Files]] = {
     DerotateOptions: _rotated,
     VDisparityOptions: _counted,
     HeightsOptions: _heights_of_row,

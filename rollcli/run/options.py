@@ -6,7 +6,7 @@ What a docstring says of a field is the help of the field's option, and names va
 import math
 import posixpath
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -53,6 +53,23 @@ class ImageKind(NamedTuple):
             return (None,)
         formats: tuple[Save, ...] = ("png", "tiff") if save_as == "png" else (save_as,)
         return tuple(ENDING_OF_FORMAT[each] for each in formats)
+
+
+class Written(NamedTuple):
+    """A file that is written for each frame, named after it.
+
+    Attributes
+    ----------
+    kind : str
+        What it holds; `ImageKind` names those of `estimate`.
+    folder : str
+    endings : tuple of (str or None)
+        Those that it may have, the usual one first; None: the frame's own.
+    """
+
+    kind: str
+    folder: str
+    endings: tuple[str | None, ...]
 
 
 KINDS = (
@@ -259,9 +276,14 @@ class ImageOptions(NamedTuple):
     heights_range: tuple[float, float] = HEIGHTS_RANGE
     save_as: Save = "png"
 
-    def folders(self) -> list[tuple[ImageKind, str]]:
-        """List (kind, folder) of the images that were requested."""
-        return [(kind, folder) for kind in KINDS if (folder := getattr(self, kind.name)) is not None]
+    def writes(self, *, computed: bool) -> tuple[Written, ...]:
+        """List the images that were requested; `computed`: of maps that are computed from pairs."""
+        named = ((kind, getattr(self, kind.name)) for kind in KINDS)
+        return tuple(
+            Written(kind.name, folder, kind.endings(self.save_as, computed=computed))
+            for kind, folder in named
+            if folder is not None
+        )
 
     @property
     def needs_photo(self) -> bool:
@@ -302,12 +324,13 @@ class RunningOptions(NamedTuple):
 
 
 class FrameOptions(NamedTuple):
-    """What decides the row and the images of a frame: everything that a worker is told beside the frame.
+    """What decides the row and the files of a frame: everything that a worker is told beside the frame.
 
-    `root` is the folder where relative paths start, for workers on other machines; empty for this one.
-    `replaces` tells whether files that are in the place of an image are replaced. `retry_of` names the result
-    whose failed frames are done again; empty otherwise. `notes` tells whether workers say what each frame was
-    read from.
+    `writes` are its files. `root` is the folder where relative paths start, for workers on other machines;
+    empty for this one. `replaces` tells whether files that are in the place of an image are replaced.
+    `retry_of` names the result whose failed frames are done again; empty otherwise. `notes` tells whether
+    workers say what each frame was read from. `convert` is the conversion that makes the files; None: the
+    roll is estimated.
     """
 
     encoding: EncodingOptions = EncodingOptions()
@@ -315,11 +338,13 @@ class FrameOptions(NamedTuple):
     region: RegionOptions = RegionOptions()
     method: MethodOptions = MethodOptions()
     images: ImageOptions = ImageOptions()
+    side_by_side: Layout | None = None
+    writes: tuple[Written, ...] = ()
     root: str = ""
     replaces: bool = False
     retry_of: str = ""
     notes: bool = False
-    side_by_side: Layout | None = None
+    convert: "ConvertOptions | None" = None
 
     def at(self, path: str) -> str:
         """Locate a path on this worker."""
@@ -382,78 +407,94 @@ class ResultOptions(NamedTuple):
         return self.format or _FORM_OF_ENDING.get(ending, "csv")
 
 
-class EstimateOptions(NamedTuple):
-    """Every option of `rollcli estimate`."""
+@dataclass(frozen=True, kw_only=True)
+class FramesOptions(ABC):
+    """What every command is told that goes through frames."""
 
     inputs: InputOptions
-    pairs: PairOptions
-    encoding: EncodingOptions
-    stereo: StereoOptions
-    region: RegionOptions
-    method: MethodOptions
-    images: ImageOptions
-    result: ResultOptions
     running: RunningOptions
-    calibration: CalibrationOptions = CalibrationOptions()
-    topics: TopicOptions = TopicOptions()
-
-    @property
-    def frame(self) -> FrameOptions:
-        """The part that decides the row and the images of a frame."""
-        return FrameOptions(
-            self.encoding,
-            self.stereo,
-            self.region,
-            self.method,
-            self.images,
-            self.running.root,
-            side_by_side=self.pairs.side_by_side,
-        )
+    pairs: PairOptions = field(default_factory=PairOptions)
+    topics: TopicOptions = field(default_factory=TopicOptions)
+    encoding: EncodingOptions = field(default_factory=EncodingOptions)
+    stereo: StereoOptions = field(default_factory=StereoOptions)
+    region: RegionOptions = field(default_factory=RegionOptions)
+    calibration: CalibrationOptions = field(default_factory=CalibrationOptions)
 
     @property
     def paired(self) -> bool:
         """Whether the frames are stereo pairs."""
         return any((*self.pairs[:2], self.pairs.side_by_side, *self.topics[:2]))
 
+    @property
+    @abstractmethod
+    def writes(self) -> tuple[Written, ...]:
+        """The files that may be written for a frame."""
+
+    @property
+    def folders(self) -> list[str]:
+        """Where files are written: no inputs are searched there."""
+        return [each.folder for each in self.writes]
+
+    @property
+    def frame(self) -> FrameOptions:
+        """What a worker is told of the frames."""
+        return FrameOptions(
+            self.encoding,
+            self.stereo,
+            self.region,
+            side_by_side=self.pairs.side_by_side,
+            writes=self.writes,
+            root=self.running.root,
+            replaces=self.running.overwrite,
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
-class ConvertOptions(ABC):
+class EstimateOptions(FramesOptions):
+    """Every option of `rollcli estimate`."""
+
+    method: MethodOptions
+    images: ImageOptions
+    result: ResultOptions
+
+    @property
+    def writes(self) -> tuple[Written, ...]:
+        """The images."""
+        return self.images.writes(computed=self.paired)
+
+    @property
+    def frame(self) -> FrameOptions:
+        """What decides the row and the images of a frame."""
+        return super().frame._replace(method=self.method, images=self.images)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConvertOptions(FramesOptions):
     """What every command is told that makes files of each frame.
 
     Attributes
     ----------
-    inputs : InputOptions
     output : str
         Where the files go, named after their input; folders below the named ones are kept.
-    running : RunningOptions
-    encoding : EncodingOptions
-        How maps are read.
-    calibration : CalibrationOptions
-        How maps are read.
     result : str or None
         Has the row of each map.
     skip_suspect : bool
         Leave out the maps whose row is suspect.
     """
 
-    inputs: InputOptions
     output: str
-    running: RunningOptions
-    encoding: EncodingOptions = field(default_factory=EncodingOptions)
-    calibration: CalibrationOptions = field(default_factory=CalibrationOptions)
     result: str | None = None
     skip_suspect: bool = False
 
     @property
     def frame(self) -> FrameOptions:
-        """How a frame is read, and its files are written."""
-        root, replaces = self.running.root, self.running.overwrite
-        return FrameOptions(encoding=self.encoding, root=root, replaces=replaces)
+        """How a frame is read, and its files are made."""
+        return super().frame._replace(convert=replace(self, inputs=InputOptions()))  # which may be long
 
-    @property
-    @abstractmethod
-    def writes(self) -> list[tuple[str, str | None]]:
-        """Folder and ending of each file that may be written for a frame; None: the frame's own ending."""
+
+def _picture(preview: str | None) -> list[Written]:
+    """List the picture to look at, if it is asked for."""
+    return [] if preview is None else [Written("preview", preview, (".png",))]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -479,9 +520,10 @@ class DerotateOptions(ConvertOptions):
     save_matrix: bool = False
 
     @property
-    def writes(self) -> list[tuple[str, str | None]]:
+    def writes(self) -> tuple[Written, ...]:
         """The map, and its matrix."""
-        return [(self.output, None), *([(self.output, ".txt")] if self.save_matrix else [])]
+        matrix = [Written("matrix", self.output, (".txt",))] if self.save_matrix else []
+        return Written("derotated", self.output, (None,)), *matrix
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -506,10 +548,10 @@ class HeightsOptions(ConvertOptions):
     save_as: Literal["tiff", "npy"] = "tiff"
 
     @property
-    def writes(self) -> list[tuple[str, str | None]]:
+    def writes(self) -> tuple[Written, ...]:
         """The heights, and their picture."""
-        picture = [(self.preview, ".png")] if self.preview is not None else []
-        return [(self.output, ENDING_OF_FORMAT[self.save_as]), *picture]
+        heights = Written("heights", self.output, (ENDING_OF_FORMAT[self.save_as],))
+        return heights, *_picture(self.preview)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -540,11 +582,10 @@ class VDisparityOptions(ConvertOptions):
     figure: str | None = None
 
     @property
-    def writes(self) -> list[tuple[str, str | None]]:
-        """The figure; or the picture and the counts."""
-        if self.figure is not None:
-            return [(self.output, f".{self.figure}")]
-        return [(self.output, ".png"), *([(self.output, ".tif")] if self.counts else [])]
+    def writes(self) -> tuple[Written, ...]:
+        """The figure or the picture, and the counts."""
+        counts = [Written("counts", self.output, (".tif",))] if self.counts else []
+        return Written("vdisparity", self.output, (f".{self.figure or 'png'}",)), *counts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -557,25 +598,27 @@ class DisparityOptions(ConvertOptions):
         Also write each map as a picture to look at, in colour with a scale in pixels, PNG.
     """
 
-    pairs: PairOptions
-    topics: TopicOptions = field(default_factory=TopicOptions)
-    stereo: StereoOptions = field(default_factory=StereoOptions)
     save_as: Save = "png"
     preview: str | None = None
 
     @property
-    def frame(self) -> FrameOptions:
-        """How a pair is matched: levelled as the estimate does, then every row."""
-        images = ImageOptions(disparity=self.output)
-        layout = self.pairs.side_by_side
-        return super().frame._replace(stereo=self.stereo, images=images, side_by_side=layout)
+    def paired(self) -> bool:
+        """Whether the frames are stereo pairs: always."""
+        return True
 
     @property
-    def writes(self) -> list[tuple[str, str | None]]:
-        """The map, the TIFF in place of a PNG that cannot hold it, and last the picture."""
-        maps = [(self.output, ENDING_OF_FORMAT[self.save_as])]
-        maps += [(self.output, ENDING_OF_FORMAT["tiff"])] if self.save_as == "png" else []
-        return [*maps, *([(self.preview, ".png")] if self.preview is not None else [])]
+    def frame(self) -> FrameOptions:
+        """How a pair is matched: levelled as the estimate does, then every row."""
+        return super().frame._replace(images=self._images)
+
+    @property
+    def _images(self) -> ImageOptions:
+        return ImageOptions(disparity=self.output, save_as=self.save_as)
+
+    @property
+    def writes(self) -> tuple[Written, ...]:
+        """The map, and its picture."""
+        return *self._images.writes(computed=True), *_picture(self.preview)
 
 
 @dataclass(frozen=True)

@@ -21,13 +21,12 @@ from rollcli.files.storage import create, read_bytes, remove, remove_all, write_
 from rollcli.files.stores.locations import is_object_url, is_url, located, public_name
 from rollcli.files.stores.objects import list_objects
 from rollcli.run.frame import Frame
-from rollcli.run.options import ENDING_OF_FORMAT, ConvertOptions, ImageKind, ImageOptions, RunningOptions
+from rollcli.run.options import ENDING_OF_FORMAT, RunningOptions, Written
 
 
-def possible_paths(frame: Frame, images: ImageOptions) -> Iterator[tuple[ImageKind, list[str]]]:
-    """Yield the kind of each image of a frame, and the paths of which one is written, the usual one first."""
-    for kind, folder in images.folders() if frame.relative else ():
-        endings = kind.endings(images.save_as, computed=bool(frame.right_file))
+def possible_paths(frame: Frame, writes: Iterable[Written]) -> Iterator[tuple[str, list[str]]]:
+    """Yield the kind of each file of a frame, and the paths of which one is written, the usual one first."""
+    for kind, folder, endings in writes if frame.relative else ():
         yield kind, [output_path(frame, folder, ending) for ending in endings]
 
 
@@ -36,12 +35,12 @@ def roomy_path(path: str) -> str:
     return posixpath.splitext(path)[0] + ENDING_OF_FORMAT["tiff"]
 
 
-def local_images(
-    frames: Iterable[Frame], status: bytes, images: ImageOptions, root: str = ""
+def local_files(
+    frames: Iterable[Frame], status: bytes, writes: Sequence[Written], root: str = ""
 ) -> Iterator[str]:
-    """Yield the images of those frames that have angles which a power cut may take from a local disk."""
+    """Yield the files of those frames that have angles which a power cut may take from a local disk."""
     angled = (frame for frame, at in zip(frames, status, strict=True) if STATUSES[at] != "error")
-    return itertools.filterfalse(is_url, images_of(angled, images, root))
+    return itertools.filterfalse(is_url, files_of(angled, writes, root))
 
 
 def output_path(frame: Frame, folder: str, ending: str | None = None) -> str:
@@ -50,21 +49,19 @@ def output_path(frame: Frame, folder: str, ending: str | None = None) -> str:
     return f"{folder}{name}" if folder.endswith("/") else f"{folder}/{name}"
 
 
-def paths_of(frame: Frame, options: ConvertOptions) -> list[str]:
-    """List the files that a conversion may write for a frame; none of one whose URL names no file."""
-    return [output_path(frame, *each) for each in options.writes] if frame.relative else []
+def every_path(frame: Frame, writes: Iterable[Written], root: str = "") -> list[str]:
+    """List every file that may be written for a frame, from a folder where relative paths start.
+
+    There is none of a frame whose URL names no file.
+    """
+    return [located(root, path) for _, paths in possible_paths(frame, writes) for path in paths]
 
 
-def every_path(frame: Frame, images: ImageOptions, root: str = "") -> list[str]:
-    """List every image that may be written for a frame, from a folder where relative paths start."""
-    return [located(root, path) for _, paths in possible_paths(frame, images) for path in paths]
-
-
-def images_of(frames: Iterable[Frame], images: ImageOptions, root: str = "") -> Iterator[str]:
-    """Yield every image that may be written for frames; a list of them would take most of our memory."""
-    if not images.folders():
+def files_of(frames: Iterable[Frame], writes: Sequence[Written], root: str = "") -> Iterator[str]:
+    """Yield every file that may be written for frames; a list of them would take most of our memory."""
+    if not writes:
         return iter(())
-    return (path for frame in frames for path in every_path(frame, images, root))
+    return (path for frame in frames for path in every_path(frame, writes, root))
 
 
 def write_outputs(
@@ -128,17 +125,12 @@ def _mark(data: bytes, result: str) -> bytes:
     return hashlib.sha256(result.encode("utf-8", "surrogateescape") + b"\0" + data).hexdigest().encode()
 
 
-def remove_marks(frames: Collection[Frame], images: ImageOptions) -> None:
-    """Remove the marks beside the images of frames that were done again, and what killed workers left."""
-    paths = list(images_of(frames, images))
+def remove_marks(frames: Collection[Frame], writes: Sequence[Written]) -> None:
+    """Remove the marks beside the files of frames that were done again, and what killed workers left."""
+    paths = list(files_of(frames, writes))
     marks = [mark_path(path) for path in paths]
     remove_leftovers([*paths, *marks])
     remove_all(filter(is_url, marks))
-
-
-def remove_image_leftovers(frames: Iterable[Frame], images: ImageOptions) -> None:
-    """Remove the temporary files that killed workers left beside the images of these frames."""
-    remove_leftovers(images_of(frames, images))
 
 
 _LISTED_AT_ONCE = 10_000

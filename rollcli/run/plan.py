@@ -1,22 +1,19 @@
 """Decide and check what a run will read and write, before anything runs."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import chain
 
 from rollcli.errors import UsageError
-from rollcli.files.containers import file_of
 from rollcli.files.results import IMAGE_ROLL, TIMING, Format, require_utf8, run_path
 from rollcli.files.storage import is_stream
-from rollcli.files.stores.locations import is_url, tasks_in_hand
+from rollcli.files.stores.locations import is_url
 from rollcli.rig.calibration import Calibration
 from rollcli.run import outputs
-from rollcli.run.find import Named, calibration_files, check_depth, check_first_size, map_frames, pair_frames
+from rollcli.run.find import calibration_files, check_depth, check_first_size, find_frames
 from rollcli.run.frame import Frame
-from rollcli.run.options import EstimateOptions, FrameOptions, ResultOptions, RunningOptions
+from rollcli.run.options import EstimateOptions, ResultOptions
 from rollcli.run.result_file import inputs_path
-from rollcli.run.workers.chunks import Workers
 
 
 @dataclass(frozen=True)
@@ -61,7 +58,7 @@ def make_plan(options: EstimateOptions) -> Plan:
         frames with the same image; an image or a result that would replace an input, or that exists already.
     """
     _check_start(options)
-    frames = _find_frames(options)
+    frames = find_frames(options)
     if not options.paired:
         check_depth(frames, options.encoding)
     plan = Plan(options, frames)
@@ -70,23 +67,23 @@ def make_plan(options: EstimateOptions) -> Plan:
             f"{plan.output}: rows of a result in parts (Parquet, or below a URL) keep their places: "
             "--update takes a result in one file of CSV or JSON Lines"
         )
-    if options.images.folders():
+    if options.writes:
         outputs.check_one_owner(
-            ((frame, outputs.every_path(frame, options.images)) for frame in frames), plan.files
+            ((frame, outputs.every_path(frame, options.writes)) for frame in frames), plan.files
         )
     calibrations = calibration_files(options.calibration)
     outputs.check_inputs_are_kept(
         lambda: chain(calibrations, (path for frame in plan.frames for path in frame.reads())),
-        chain(plan.files, outputs.images_of(plan.frames, options.images)),
+        chain(plan.files, outputs.files_of(plan.frames, options.writes)),
     )
     every, frames = frames, _shard(frames, options.result)
-    outputs.check_places(frames, [folder for _, folder in options.images.folders()])
+    outputs.check_places(frames, options.folders)
     calibrated = options.calibration.given or any(frame.calibration for frame in every[:1])
     checked = calibrated or options.pairs.side_by_side is not None
     notes, first = check_first_size(every, options.frame) if checked else ([], None)
     further = further_columns(every, first, options)
     if not (options.running.overwrite or options.result.resume):
-        outputs.check_nothing_is_there(outputs.images_of(frames, options.images))
+        outputs.check_nothing_is_there(outputs.files_of(frames, options.writes))
     if plan.format == "parquet" and is_stream(plan.output):
         raise UsageError("Parquet is a folder of parts: name it with --output")
     if plan.format == "parquet" and not options.inputs.sorted:  # those are read as they are needed
@@ -95,7 +92,7 @@ def make_plan(options: EstimateOptions) -> Plan:
 
 
 def _check_start(options: EstimateOptions) -> None:
-    """Refuse to continue a result and to begin it anew at once, or to continue what is no file."""
+    """Refuse options that contradict each other or the inputs."""
     asked = options.result
     flag = "--update" if asked.update else "--resume"
     if asked.retry_failed and not asked.resume:
@@ -104,6 +101,8 @@ def _check_start(options: EstimateOptions) -> None:
         raise UsageError(f"give either {flag} or --overwrite")
     if asked.resume and is_stream(asked.output):
         raise UsageError(f"{flag} needs a result file: name it with --output")
+    if options.images.disparity is not None and not options.paired:
+        raise UsageError("--disparity writes maps computed from --left and --right; here maps are the input")
 
 
 def further_columns(
@@ -124,39 +123,3 @@ def _shard(frames: Sequence[Frame], options: ResultOptions) -> Sequence[Frame]:
     if options.shard_by == "range":
         return frames[(part - 1) * len(frames) // parts : part * len(frames) // parts]
     return frames[part - 1 :: parts]
-
-
-def _find_frames(options: EstimateOptions) -> Sequence[Frame]:
-    given, quiet = options.inputs, options.running.quiet
-    skip = [folder for _, folder in options.images.folders()]
-    if options.paired and given.sorted:
-        raise UsageError("--sorted takes a list of maps, not of pairs")
-    named = Named(given, quiet, options.pairs, options.topics, options.region, options.calibration, skip)
-    if options.paired:
-        return pair_frames(named)
-    if options.images.disparity is not None:
-        raise UsageError("--disparity writes maps computed from --left and --right; here maps are the input")
-    return map_frames(named)
-
-
-def workers_for(
-    frames: Sequence[Frame], running: RunningOptions, folders: Iterable[str], parts: Iterable[str] = ()
-) -> Workers:
-    """Say which workers do the frames, what they write below `folders`, and what they must see.
-
-    `parts`: the folder of those parts of a result that they write.
-    """
-    files = tuple(file_of(path) for frame in (*frames[:1], *frames[-1:]) for path in frame.reads())
-    threads = tasks_in_hand((*files, *folders))
-    return Workers(running.jobs, running.scheduler, files, (*folders, *parts), threads)
-
-
-def decoder_for(frames: Iterable[Frame], options: FrameOptions) -> Callable[[Frame], Frame] | None:
-    """Return what reads the views of frames of videos for the workers of this machine; see `Work.prepare`."""
-    return partial(_decode, options=options) if any(frame.of_videos for frame in frames) else None
-
-
-def _decode(frame: Frame, options: FrameOptions) -> Frame:
-    from rollcli.run.read import decoded  # loads NumPy, which other runs leave to the workers
-
-    return decoded(frame, options)

@@ -14,7 +14,7 @@ from rollcli.files.storage import is_stream, open_stream
 from rollcli.files.stores.locations import base_name
 from rollcli.run.batch import Batch
 from rollcli.run.frame import Frame
-from rollcli.run.outputs import local_images
+from rollcli.run.outputs import local_files
 from rollcli.run.parts import kept_in_parts, open_parts
 from rollcli.run.plan import Plan
 from rollcli.run.result_file import (
@@ -61,7 +61,7 @@ class FileOutput(Output):
 
     def append(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
         """Add the rows, which may wait for others."""
-        images = local_images(frames, batch.figures.status, self._plan.options.images)
+        images = local_files(frames, batch.figures.status, self._plan.options.writes)
         self._rows.append(batch.lines, batch.notes, images)
 
     def _keep_images(self, images: Iterable[str]) -> None:

@@ -17,6 +17,7 @@ from typing import Any, TypeVar, get_args
 from rollcli import __version__
 from rollcli.errors import InputError, OutputError
 from rollcli.files import results
+from rollcli.files.atomic import remove_leftovers
 from rollcli.files.locking import differences, not_resumable
 from rollcli.files.storage import write_bytes
 from rollcli.files.stores.locations import base_name, public_name
@@ -289,7 +290,7 @@ class KeptRows:
         self.incomplete: list[Frame] = []
         self.summary = RunSummary()
         self.mismatch = ""
-        self._frames, self._images = plan.frames, plan.options.images
+        self._frames, self._writes = plan.frames, plan.options.writes
         self._following = iter(plan.frames)
         self._retries = plan.options.result.retry_failed
         self._made = outputs.Existing(filled=True)
@@ -323,7 +324,7 @@ class KeptRows:
                     self.changed.append(frame.file)
                     is_again = True
             if row.status != "error" and not is_again:
-                images = outputs.possible_paths(frame, self._images)
+                images = outputs.possible_paths(frame, self._writes)
                 if not all(any(path in self._made for path in paths) for _, paths in images):
                     self.incomplete.append(frame)
         if row.status == "error":
@@ -465,14 +466,14 @@ class Output:
         self._take_images(frames, batch.figures.status)
 
     def _take_images(self, frames: Sequence[Frame], status: bytes) -> None:
-        self._keep_images(outputs.local_images(frames, status, self._plan.options.images))
+        self._keep_images(outputs.local_files(frames, status, self._plan.options.writes))
 
     def _keep_images(self, images: Iterable[str]) -> None:
         """Have images forced to the disk before the rows that come next are written."""
 
     def _end_replacing(self) -> None:
         """Forget the rows that are written, and what told their images from those of other programs."""
-        outputs.remove_marks([self._plan.frames[at] for at in self._new_rows], self._plan.options.images)
+        outputs.remove_marks([self._plan.frames[at] for at in self._new_rows], self._plan.options.writes)
         self._new_rows.clear()
         self._new_notes.clear()
 
@@ -497,11 +498,11 @@ def new_record(plan: Plan, kept: KeptRows) -> RunRecord:
         if found and kept.count:
             raise not_resumable(plan.output, found)
         if found:  # what is there is of another run
-            outputs.check_nothing_is_there(outputs.images_of(plan.frames, options.images))
+            outputs.check_nothing_is_there(outputs.files_of(plan.frames, options.writes))
         elif earlier is not None:
             record.continue_from(earlier)
     if options.result.resume or options.running.overwrite:
-        outputs.remove_image_leftovers(kept.not_failed(), options.images)
+        remove_leftovers(outputs.files_of(kept.not_failed(), options.writes))
     return record
 
 

@@ -37,7 +37,7 @@ from pathlib import Path
 from rollcli.run.workers.pool import limit_blas_threads, prepare_worker
 limit_blas_threads()
 prepare_worker()
-from rollcli.run.estimate_frame import run_frame
+from rollcli.run.frame_task import run_frame
 from rollcli.run.frame import Frame
 from rollcli.run.options import *
 options = FrameOptions(EncodingOptions(), StereoOptions(), RegionOptions(), MethodOptions(), ImageOptions())

@@ -30,7 +30,7 @@ from rollcli.evaluate.options import ExperimentOptions, PaperOptions
 from rollcli.evaluate.paper_page import all_tables, paper_page, table_csv
 from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.files.results import Row
-from rollcli.run.options import EncodingOptions, InputOptions, RegionOptions, RunningOptions
+from rollcli.run.options import InputOptions, RegionOptions, RunningOptions
 from tests.estimator.synthetic_maps import bent_road
 from tests.recorded import made, recorded_test
 from tests.report.test_recorded import drawn
@@ -137,11 +137,10 @@ def _page(count=1, seconds=(1.0,), region=None, **experiments):
     pytest.importorskip("jinja2", reason="jinja2, of the extra report, is not here")
     found, timed = [_map_of(f"map{place}.png") for place in range(count)], [_times(each) for each in seconds]
     options = PaperOptions(
-        InputOptions(("maps",)),
-        EncodingOptions(),
-        region or RegionOptions(),
-        ExperimentOptions("out", **experiments),
-        RunningOptions(),
+        inputs=InputOptions(("maps",)),
+        region=region or RegionOptions(),
+        experiments=ExperimentOptions("out", **experiments),
+        running=RunningOptions(),
     )
     tables = all_tables(found, [], timed)
     page = paper_page(tables, _figures(tables), found, [], timed, options).decode()

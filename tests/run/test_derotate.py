@@ -12,8 +12,8 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.request import Request
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import encode_stored, read_stored
-from rollcli.run import images as work
-from rollcli.run.images import convert_frame
+from rollcli.run import frame_work
+from rollcli.run.frame_work import do_frame
 from tests.run_cli import contents, road_map, rollcli, rows_of, write_kitti, write_maps
 
 TYPES = {
@@ -107,11 +107,11 @@ def test_the_matrix_says_where_each_pixel_has_gone(tmp_path, more):
 def test_an_interrupted_run_says_that_what_is_written_is_whole(folder, monkeypatch):
     assert rollcli("derotate", "maps", "--roll", "2", "-o", "whole", cwd=folder).status == 0
 
-    def interrupted(*arguments):
+    def interrupted(*arguments, **told):
         signal.raise_signal(signal.SIGINT)
-        return convert_frame(*arguments)
+        return do_frame(*arguments, **told)
 
-    monkeypatch.setattr(work, "convert_frame", interrupted)
+    monkeypatch.setattr(frame_work, "do_frame", interrupted)
     done = rollcli("derotate", "maps", "--roll", "2", "-o", "out", cwd=folder)
     assert done.status == 130
     assert "interrupted; what is written is whole, and --overwrite starts anew" in done.err

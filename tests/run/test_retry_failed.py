@@ -11,9 +11,8 @@ import pytest
 from rollcli.errors import OutputError, UsageError
 from rollcli.files.results import format_header, read_result
 from rollcli.files.storage import read_bytes, remove, write_bytes
-from rollcli.run import estimate as batch_run
-from rollcli.run import parts, result_file
-from rollcli.run.estimate import estimate_frame
+from rollcli.run import frame_work, parts, result_file
+from rollcli.run.frame_work import do_frame
 from rollcli.run.result_file import open_result
 from tests.object_store import objects_below
 from tests.run_cli import contents, road_map, rollcli, started, wait_until, write_kitti, write_maps
@@ -96,10 +95,10 @@ def test_a_retry_that_is_interrupted_keeps_what_it_has_done_and_is_taken_up_agai
 
     def interrupted(frame, options):
         signal.raise_signal(signal.SIGINT)
-        return estimate_frame(frame, options)
+        return do_frame(frame, options)
 
     with monkeypatch.context() as patch:
-        patch.setattr(batch_run, "estimate_frame", interrupted)
+        patch.setattr(frame_work, "do_frame", interrupted)
         done = rollcli(*line, *RETRY, cwd=folder)
     assert done.status == 130
     assert "interrupted; continue with: rollcli estimate maps" in done.err

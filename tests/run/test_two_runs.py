@@ -1,7 +1,5 @@
 """Two runs on one result of parts are told apart before they mix their rows."""
 
-from typing import get_type_hints
-
 import pytest
 
 from rollcli.errors import UsageError
@@ -9,7 +7,15 @@ from rollcli.files.locking import locked_folder
 from rollcli.files.results import Row, read_result
 from rollcli.run.batch import BatchOptions, join_results
 from rollcli.run.frame import FrameResult
-from rollcli.run.options import EstimateOptions, FrameOptions, InputOptions, ResultOptions
+from rollcli.run.options import (
+    EstimateOptions,
+    FrameOptions,
+    ImageOptions,
+    InputOptions,
+    MethodOptions,
+    ResultOptions,
+    RunningOptions,
+)
 from rollcli.run.plan import make_plan
 from rollcli.run.progress import RunSummary
 from rollcli.run.result import open_output
@@ -22,9 +28,16 @@ from tests.run_cli import contents, rollcli, write_maps
 def plan(bucket, tmp_path):
     """The plan of a run over four maps on disk, in parts of two rows in the bucket."""
     write_maps(tmp_path / "maps", 4)
-    defaults = EstimateOptions(*(kind() for kind in get_type_hints(EstimateOptions).values()))
     result = ResultOptions(output=f"{bucket}/rolls.csv", part_rows=2)
-    return make_plan(defaults._replace(inputs=InputOptions((str(tmp_path / "maps"),)), result=result))
+    return make_plan(
+        EstimateOptions(
+            inputs=InputOptions((str(tmp_path / "maps"),)),
+            running=RunningOptions(),
+            method=MethodOptions(),
+            images=ImageOptions(),
+            result=result,
+        )
+    )
 
 
 def append(output, frames, first=0):

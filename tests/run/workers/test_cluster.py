@@ -205,7 +205,7 @@ from pathlib import Path
 import rollcli
 from rollcli.run.workers import cluster
 rollcli.__version__ = cluster.__version__ = "0.0"
-from rollcli.run import estimate_frame as frame_task
+from rollcli.run import frame_task
 run_frame = frame_task.run_frame
 def noted(*given):
     Path("worked").touch()

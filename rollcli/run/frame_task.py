@@ -11,7 +11,7 @@ from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import with_pose
 from rollcli.run.diagnosis import looks_like
 from rollcli.run.frame import Frame, FrameResult
-from rollcli.run.images import Pictured, encode_images
+from rollcli.run.images import Made, Pictured, converted, encode_images, require_angle
 from rollcli.run.options import FrameOptions
 from rollcli.run.outputs import every_path, write_outputs
 from rollcli.run.read import Source, guarded, read_source
@@ -19,37 +19,43 @@ from rollcli.run.result_file import inputs_line
 
 
 def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
-    """Estimate the roll of one frame and write its images; what is wrong with it becomes an `error` row.
+    """Read a frame, make its row and write its files; what is wrong with it becomes an `error` row.
 
     Raises
     ------
     OutputError
-        An image cannot be written, which ends the run.
+        A file cannot be written, which ends the run.
     """
     start = time.perf_counter()
-    images: dict[str, bytes] = {}
+    files: dict[str, bytes] = {}
+
+    def work() -> FrameResult:
+        require_angle(frame, options)
+        source = read_source(frame, options)
+        make = _estimated if options.convert is None else converted
+        row, made, warnings = make(frame, source, options)
+        files.update(made)  # last: a frame that fails has none
+        return FrameResult(row, source.encoding, warnings, source.searched)
+
     with noting(options.notes) as notes:
-        result = guarded(frame, lambda: _estimate(frame, options, images))
-    paths = every_path(frame, options.images, options.root)
-    write_outputs(images, paths, replaces=options.replaces, retry_of=options.retry_of)
+        result = guarded(frame, work)
+    paths = every_path(frame, options.writes, options.root)
+    write_outputs(files, paths, replaces=options.replaces, retry_of=options.retry_of)
     elapsed = 1000 * (time.perf_counter() - start)
     noted = {**notes, **(frame.decoded.notes if frame.decoded else {})}
     inputs = inputs_line(frame, noted, options.at) if options.notes else b""
     return replace(result, row=replace(result.row, elapsed_ms=elapsed), inputs=inputs)
 
 
-def _estimate(frame: Frame, options: FrameOptions, images: dict[str, bytes]) -> FrameResult:
-    """Make the row, and last the images: a frame that fails has none."""
-    source = read_source(frame, options)
+def _estimated(frame: Frame, source: Source, options: FrameOptions) -> Made:
     calibration = source.calibrated(frame.calibration)
     estimate, likeness = _estimate_roll(source, options, calibration)
     # the images are turned by the angle of the pixels, which is not the rig's where fx and fy differ
-    made, note = encode_images(frame, Pictured(source, estimate, options, calibration))
+    files, note = encode_images(frame, Pictured(source, estimate, options, calibration))
     if calibration is not None:
         estimate = with_pose(estimate, calibration)
     row = _row(frame, source, estimate, note, likeness)
-    images.update(made)
-    return FrameResult(row, source.encoding, {**source.warnings, likeness: likeness}, source.searched)
+    return row, files, {**source.warnings, likeness: likeness}
 
 
 def _estimate_roll(
