@@ -62,6 +62,10 @@ class WorkerError(RollcliError):
     """Workers cannot start, or a cluster's cannot do the work (exit status 1)."""
 
 
+class WorkerDiedError(WorkerError):
+    """A worker ended amid its tasks; says what may have killed it. Costs the task that did, not the batch."""
+
+
 class OutputError(RollcliError):
     """A result cannot be written: the program cannot do its job (exit status 1)."""
 

@@ -109,10 +109,6 @@ class Work(Generic[Task, Result]):
         """The time after which a worker of this machine begins no further task of a chunk."""
         return _LONGEST_S if self.unit == 1 else LONGEST_ON_CLUSTER_S
 
-    def done(self, chunk: Sequence[Task], result: Result) -> "Done[Result]":
-        """Make what is handed back of a single task."""
-        return Done(self.join(chunk, [result]), 0.0)
-
 
 @dataclass(frozen=True)
 class Done(Generic[Result]):

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Generic
 
 from rollcli import __version__
-from rollcli.errors import OutputError, UsageError, WorkerError, reading
+from rollcli.errors import OutputError, UsageError, WorkerDiedError, WorkerError, reading
 from rollcli.extras import require_extra
 from rollcli.files.atomic import is_file, is_there, write_atomic
 from rollcli.files.storage import remove
@@ -87,9 +87,6 @@ class ClusterExecutor(Generic[Task, Result]):
     """
 
     def __init__(self, given: str, work: Work[Task, Result], asked: Workers) -> None:
-        from distributed import KilledWorker
-
-        self.worker_died: tuple[type[BaseException], ...] = (KilledWorker,)
         self.threads, self.address = asked.threads, scheduler_address(given)
         self._work, self._asked, self._stopped = work, asked, False
         self._run = uuid.uuid4().hex
@@ -159,10 +156,7 @@ class ClusterExecutor(Generic[Task, Result]):
         future = self.submit(chunk, first=True)
         while not future.done():
             self.wait(future)
-        try:
-            return future.result()
-        except self.worker_died:
-            return self._work.done(chunk, self._work.lost(chunk[0], _DIED))
+        return future.result()
 
     def stop(self) -> None:
         """Let workers begin no further task."""
@@ -220,12 +214,11 @@ class ClusterFuture(Generic[Task, Result]):
         """Tell whether the result is there."""
         if not self._sent.done():
             return False
-        if self._sent.status == "error" and self._tries < _MOST_TRIES:
-            error = self._sent.exception()
-            if not isinstance(error, self._executor.worker_died):  # of the worker: tasks' errors are results
-                self._executor.take_in_workers()
-                self.send_again()
-                return False
+        failed = self._sent.status == "error" and self._tries < _MOST_TRIES
+        if failed and not _is_death(self._sent.exception()):  # of the worker: tasks' errors are results
+            self._executor.take_in_workers()
+            self.send_again()
+            return False
         return True
 
     def result(self) -> Done[Result]:
@@ -233,7 +226,7 @@ class ClusterFuture(Generic[Task, Result]):
 
         Raises
         ------
-        KilledWorker
+        WorkerDiedError
             Workers have died.
         WorkerError
             The scheduler is lost, or workers cannot do the work.
@@ -246,9 +239,15 @@ class ClusterFuture(Generic[Task, Result]):
                 return found
         except (CancelledError, OSError) as lost:  # the latter where it is lost amid a result
             raise _connection_lost(self._executor.address) from lost
-        if isinstance(error, self._executor.worker_died):
-            raise error
+        if _is_death(error):
+            raise WorkerDiedError(_DIED) from error
         raise WorkerError(f"{self._executor.address}: workers cannot do the work: {error}")
+
+
+def _is_death(error: BaseException | None) -> bool:
+    from distributed import KilledWorker
+
+    return isinstance(error, KilledWorker)
 
 
 _LOCK = threading.Lock()

@@ -16,7 +16,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Generic
 
-from rollcli.errors import WorkerError
+from rollcli.errors import WorkerDiedError, WorkerError
 from rollcli.run.workers.chunks import Chunk, Done, Result, Task, Work, Workers
 from rollcli.run.workers.interrupt import ignore_signals, stop_signals
 
@@ -63,10 +63,6 @@ _CHUNKS_IN_HAND = 2  # of a worker: the next one is there when it has done one
 _DIED = "its worker died twice: killed for memory, perhaps, or crashed"
 
 
-class WorkerDiedError(Exception):
-    """The process that ran a chunk has ended."""
-
-
 class PoolExecutor(Generic[Task, Result]):
     """A fixed number of processes; chunks are sent and results received while someone waits for a result.
 
@@ -84,8 +80,6 @@ class PoolExecutor(Generic[Task, Result]):
     WorkerError
         The system starts no further process.
     """
-
-    worker_died: tuple[type[BaseException], ...] = (WorkerDiedError,)  # what its futures raise
 
     def __init__(self, workers: int, work: Work[Task, Result], asked: Workers) -> None:
         self.workers, self.threads = workers, asked.threads
@@ -119,10 +113,7 @@ class PoolExecutor(Generic[Task, Result]):
         while not future.done():
             self._receive(None)
         self._queue.extend(waiting)
-        try:
-            return future.result()
-        except WorkerDiedError:
-            return self._work.done(chunk, self._work.lost(chunk[0], _DIED))
+        return future.result()
 
     def stop(self) -> None:
         """Let workers begin no further task."""
@@ -159,7 +150,7 @@ class PoolExecutor(Generic[Task, Result]):
             done = worker.pipe.recv()
         except (EOFError, OSError):
             begun = [task for chunk, _ in worker.in_hand for task in chunk]  # all of them, perhaps
-            worker.in_hand.popleft()[1].set_exception(WorkerDiedError())
+            worker.in_hand.popleft()[1].set_exception(WorkerDiedError(_DIED))
             while self._stopped and worker.in_hand:
                 worker.in_hand.popleft()[1].set_result(Done([], 0.0))
             self._replace(index, worker)

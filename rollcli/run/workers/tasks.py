@@ -7,7 +7,8 @@ from collections.abc import Generator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from rollcli.run.workers.chunks import Chunks, Result, Span, Task, Work, Workers
+from rollcli.errors import WorkerDiedError
+from rollcli.run.workers.chunks import Chunks, Done, Result, Span, Task, Work, Workers
 from rollcli.run.workers.interrupt import Stop
 from rollcli.run.workers.pool import PoolExecutor, prepare_worker
 
@@ -61,20 +62,23 @@ def in_order(
         if not future.done():
             executor.wait(future)
             if not chunks.measured:  # one slow first task must not keep the other workers waiting
-                with contextlib.suppress(*executor.worker_died):
+                with contextlib.suppress(WorkerDiedError):
                     for early in [each for _, each in in_flight if each.done()][:1]:
                         chunks.measure(early.result(), workers)
             continue
         in_flight.popleft()
         try:
             done = future.result()
-        except executor.worker_died:
+        except WorkerDiedError:
             if stop.asked:
                 return  # whoever asked has ended the workers too
             if len(chunk) > 1:
                 submit_first(chunk[: len(chunk) // 2], chunk[len(chunk) // 2 :])
                 continue
-            done = executor.retry(chunk)
+            try:
+                done = executor.retry(chunk)
+            except WorkerDiedError as error:
+                done = Done(work.join(chunk, [work.lost(chunk[0], str(error))]), 0.0)
         chunks.measure(done, executor.workers)
         if done.results:
             yield done.results

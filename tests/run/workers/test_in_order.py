@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from rollcli.errors import InputError
+from rollcli.errors import InputError, WorkerDiedError
 from rollcli.files.stores.locations import waiting_for_network
 from rollcli.run.workers import chunks as chunk_sizes
 from rollcli.run.workers.chunks import Chunk, Done, Work, Workers
@@ -19,10 +19,7 @@ from rollcli.run.workers.tasks import run_tasks
 from tests.run.workers.tasks import in_order
 
 WORK = Work(str, str)
-
-
-class DiedError(Exception):
-    """A worker has died."""
+LOST = [("lost", task, "killed twice") for task in range(1000)]
 
 
 class FakeFuture:
@@ -35,14 +32,13 @@ class FakeFuture:
     def result(self):
         if self.executor.deadly & set(self.chunk):
             self.executor.deaths.update(self.executor.deadly & set(self.chunk))
-            raise DiedError
+            raise WorkerDiedError("killed")
         return self.executor.do(self.chunk)
 
 
 class FakeExecutor:
     """Does a chunk when it is waited for; `deadly` tasks kill their worker, `seconds` is a task's time."""
 
-    worker_died = (DiedError,)
     threads = 1
 
     def __init__(self, workers=1, deadly=(), seconds=0.1, most=10**9):
@@ -66,7 +62,7 @@ class FakeExecutor:
 
     def retry(self, chunk):
         self.retried.extend(chunk)
-        return Done([f"lost {task}" for task in chunk], 0.0)
+        raise WorkerDiedError("killed twice")
 
     def stop(self):
         self.stops += 1
@@ -122,7 +118,7 @@ def test_what_must_be_read_in_order_is_read_here_just_before_a_worker_gets_it():
     executor, read = FakeExecutor(4, deadly={5}, seconds=1e-3), []
     results = in_order(range(100), executor, Stop(), prepare=lambda task: read.append(task) or task)
     for number, result in enumerate(results):
-        assert result == ("lost 5" if number == 5 else f"did {number}")
+        assert result == (LOST[5] if number == 5 else f"did {number}")
         assert len(read) <= number + 3 * 4 + 1  # these are held in memory
     assert read == list(range(100))
     assert {len(chunk) for chunk in executor.submitted} == {1}
@@ -132,7 +128,7 @@ def test_what_must_be_read_in_order_is_read_here_just_before_a_worker_gets_it():
 def test_what_kills_workers_is_alone_in_the_end_and_costs_no_other_task(deadly):
     executor = FakeExecutor(2, deadly, seconds=0.005)
     done = list(in_order(range(1000), executor, Stop()))
-    assert done == [f"lost {task}" if task in deadly else f"did {task}" for task in range(1000)]
+    assert done == [LOST[task] if task in deadly else f"did {task}" for task in range(1000)]
     assert executor.retried == sorted(deadly)
     assert max(executor.deaths.values()) <= 9  # 200 tasks are halved eight times
 
