@@ -7,7 +7,7 @@ leave (python tests/benchmarks/bench_diagnosis.py).
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError, InputError
 from rollcli.estimator import tuning as estimator
-from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.estimate import RollEstimate, estimate_roll
 from rollcli.estimator.request import Request
 from rollcli.files.encodings import Encoding
 from rollcli.files.formats import Stored
@@ -160,6 +160,34 @@ def looks_like(
         `COMMAND` or `PYTHON`.
     """
     return "" if stored is None else next(_likenesses(disparity, stored, options, remedies), "")
+
+
+def estimate_or_liken(
+    disparity: NDArray[Any], request: Request, likeness: Callable[[], str], **how: Any
+) -> tuple[RollEstimate, str]:
+    """Estimate the roll of a map; where there is no sure angle, say what the map looks like instead.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W)
+        Pixels; 0 is no data.
+    request : Request
+    likeness : callable
+        Says it, which takes a while; see `looks_like`.
+    **how
+        What else `estimate_roll` takes.
+
+    Raises
+    ------
+    EstimationError
+        The pixels do not determine an angle; it says what the map looks like, which is its code.
+    """
+    try:
+        estimate = estimate_roll(disparity, request, **how)
+    except EstimationError as error:
+        found = likeness()
+        raise EstimationError("; ".join(filter(None, [found, str(error)])), found) from error
+    return estimate, likeness() if estimate.status != "ok" else ""
 
 
 def _likenesses(

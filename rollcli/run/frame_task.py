@@ -2,14 +2,14 @@
 
 import time
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
-from rollcli.errors import EstimationError
-from rollcli.estimator.estimate import RollEstimate, estimate_roll
+from rollcli.estimator.estimate import RollEstimate
 from rollcli.files.results import Row
 from rollcli.files.storage import noting
-from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import with_pose
-from rollcli.run.diagnosis import looks_like
+from rollcli.run.diagnosis import estimate_or_liken, looks_like
 from rollcli.run.frame import Frame, FrameResult
 from rollcli.run.images import Made, Pictured, converted, encode_images, require_angle
 from rollcli.run.options import FrameOptions
@@ -49,28 +49,16 @@ def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
 
 def _estimated(frame: Frame, source: Source, options: FrameOptions) -> Made:
     calibration = source.calibrated(frame.calibration)
-    estimate, likeness = _estimate_roll(source, options, calibration)
+    request = options.method.request(source.slope_error, calibration)
+    like = partial(looks_like, source.disparity, source.stored, options)
+    how: dict[str, Any] = {"mask": source.allowed, "road_mask": options.images.road_mask is not None}
+    estimate, likeness = estimate_or_liken(source.disparity, request, like, **how)
     # the images are turned by the angle of the pixels, which is not the rig's where fx and fy differ
     files, note = encode_images(frame, Pictured(source, estimate, options, calibration))
     if calibration is not None:
         estimate = with_pose(estimate, calibration)
     row = _row(frame, source, estimate, note, likeness)
     return row, files, {**source.warnings, likeness: likeness}
-
-
-def _estimate_roll(
-    source: Source, options: FrameOptions, calibration: Calibration | None
-) -> tuple[RollEstimate, str]:
-    """Estimate the roll; where there is no sure angle, say what the map looks like instead."""
-    request = options.method.request(source.slope_error, calibration)
-    wanted = options.images.road_mask is not None
-    try:
-        estimate = estimate_roll(source.disparity, request, mask=source.allowed, road_mask=wanted)
-    except EstimationError as error:
-        likeness = looks_like(source.disparity, source.stored, options)
-        raise EstimationError(f"{likeness}; {error}" if likeness else str(error), likeness) from error
-    doubtful = estimate.status != "ok"
-    return estimate, looks_like(source.disparity, source.stored, options) if doubtful else ""
 
 
 def _row(frame: Frame, source: Source, estimate: RollEstimate, note: str, likeness: str) -> Row:

@@ -3,11 +3,12 @@
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from numpy.typing import ArrayLike, NDArray
 
-from rollcli.errors import EstimationError, UsageError
+from rollcli.errors import UsageError
 from rollcli.estimator import estimate as estimator
 from rollcli.estimator.estimate import RollEstimate
 from rollcli.estimator.moments import map_of, usable_of
@@ -20,7 +21,7 @@ from rollcli.files.formats import Stored, read_image, read_stored
 from rollcli.files.naming import Input
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import with_pose
-from rollcli.run.diagnosis import PYTHON, looks_like
+from rollcli.run.diagnosis import PYTHON, estimate_or_liken, looks_like
 from rollcli.run.find import given_calibration
 from rollcli.run.options import FrameOptions, MethodOptions
 from rollcli.run.read import matched_source, road_finder
@@ -113,18 +114,11 @@ def estimate_roll(
     values = map_of(disparity)
     if values.ndim == 3 and values.shape[2] in (3, 4):
         raise UsageError(f"an array of shape {values.shape} is no disparity map: {PYTHON.photograph}")
-
-    def said(reason: str) -> str:
-        return "; ".join(filter(None, [_likeness(values, seed), reason]))
-
     if rig is not None and values.ndim == 2:
         request = replace(request, middle=rig.for_size(*values.shape[::-1]).cx)
-    try:
-        estimate = estimator.estimate_roll(values, request, mask=mask, road_mask=road_mask)
-    except EstimationError as error:
-        raise EstimationError(said(str(error))) from error
-    if estimate.status != "ok":
-        estimate = replace(estimate, message=said(estimate.message))
+    like = partial(_likeness, values, seed)
+    estimate, likeness = estimate_or_liken(values, request, like, mask=mask, road_mask=road_mask)
+    estimate = replace(estimate, message="; ".join(filter(None, [likeness, estimate.message])))
     return estimate if rig is None else with_pose(estimate, rig)
 
 
