@@ -7,7 +7,7 @@ them. Import-light: never loads NumPy.
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from rollcli.errors import UsageError
 from rollcli.files.atomic import sync_files
@@ -24,7 +24,7 @@ from rollcli.files.storage import create, write_bytes
 from rollcli.files.stores.locations import is_url, public_name
 from rollcli.files.stores.objects import object_owner
 from rollcli.run.frame import Frame, FrameResult, ReadAs
-from rollcli.run.options import FrameOptions
+from rollcli.run.options import FrameOptions, ResultOptions
 from rollcli.run.outputs import local_files
 from rollcli.run.progress import Figures
 from rollcli.run.result_file import inputs_line, part_inputs_path
@@ -134,11 +134,6 @@ class Step(NamedTuple):
     retries: bool = False
 
 
-def line_form(form: Format) -> Literal["csv", "jsonl"]:
-    """Return the form of a row on its way to a result; Parquet's are JSON until a part is full."""
-    return "jsonl" if form == "parquet" else form
-
-
 def part_location(output: str, form: Format, number: int) -> str:
     """Return where a part lies."""
     return f"{output}/{part_name(number, form)}"
@@ -166,25 +161,21 @@ class BatchOptions(NamedTuple):
 
     Attributes
     ----------
-    form : str
-        Of their lines; those of Parquet are JSON.
+    result : ResultOptions
     further : tuple of str
         Columns beside those of every result.
     frame : FrameOptions
         What it is told of the frames.
     verbose : bool
         Whether the user is told of every frame.
-    fail_fast : bool
-        Whether the first frame without an angle ends the run.
     parts : Parts or None
         Where whole parts go; None: all rows come back.
     """
 
-    form: Literal["csv", "jsonl"]
+    result: ResultOptions
     further: tuple[str, ...]
     frame: FrameOptions
-    verbose: bool
-    fail_fast: bool
+    verbose: bool = False
     parts: Parts | None = None
 
 
@@ -200,14 +191,15 @@ def join_results(frames: Span[Frame], results: Sequence[FrameResult], options: B
         A part cannot be written.
     """
     figures = Figures.of([result.row for result in results])
-    ends = options.fail_fast and figures.first_error >= 0
+    ends = options.result.fail_fast and figures.first_error >= 0
     if ends:
         results = results[: figures.first_error + 1]
         figures = Figures.of([result.row for result in results])
     read_as = ReadAs()
     for encoding, searched in {(result.encoding, result.searched) for result in results}:
         read_as = read_as.joined(ReadAs(frozenset(filter(None, [encoding])), searched))
-    lines = [format_row(result.row, options.form, options.further) for result in results]
+    # those of Parquet are JSON until a part is full
+    lines = [format_row(result.row, options.result.form, options.further) for result in results]
     known: ReadAs = frames.told
     made = zip(frames, results, strict=False) if options.frame.notes else ()
     notes = [result.inputs or inputs_line(frame, {}) for frame, result in made]

@@ -59,7 +59,7 @@ def _plan(options: ConvertOptions) -> list[Frame]:
         for frame, row in zip(frames, rows, strict=True)
         if row is None or row.status != "suspect" or not options.skip_suspect
     ]
-    outputs.check_one_owner((each, outputs.every_path(each, options.writes)) for each in wanted)
+    outputs.check_one_owner(wanted, options.writes)
     outputs.check_places(wanted, options.folders)
     outputs.check_writes(
         [path for each in wanted for path in each.reads()],

@@ -2,13 +2,12 @@
 
 import contextlib
 import os
-from collections.abc import Iterator
 from functools import partial
 from itertools import chain, islice
 
 from rollcli.errors import ExitStatus, OutputError, WorkerError
 from rollcli.files.stores.locations import is_url
-from rollcli.run.batch import Batch, BatchOptions, Step, join_results, line_form
+from rollcli.run.batch import BatchOptions, Step, join_results
 from rollcli.run.find import calibration_files, calibration_notes
 from rollcli.run.frame_work import work_on, workers_for
 from rollcli.run.options import EstimateOptions
@@ -78,51 +77,41 @@ def _run(plan: Plan, resume_command: str) -> ExitStatus:
 
 
 def _run_steps(plan: Plan, output: Output, progress: Progress, stop: Stop) -> None:
-    """Do one step after the other; images are written before rows, and rows in their order."""
+    """Do one step after the other, up to one that does not come to its end."""
+    progress.stopped_early = True
     for step in output.kept.steps():
-        done = 0
-        progress.stopped_early = True  # unless all frames are done
-        with _results(step, plan, output, stop) as batches:
-            following = iter(step.frames)
-            for batch in batches:
-                frames = list(islice(following, len(batch)))
-                positions = step.positions[done : done + len(batch)]
-                done += len(batch)
-                if not positions:
-                    output.restore(frames, batch)
-                    continue
-                output.record.saw(batch.read_as)  # before their rows are written
-                add = output.replace if step.retries else output.append
-                add(positions, frames, batch)
-                progress.add_rows([frame.file for frame in frames], batch.figures, positions, batch.told)
-                if plan.options.result.fail_fast and batch.figures.first_error >= 0:
-                    return
-        progress.stopped_early = done < len(step.frames)
-        if progress.stopped_early:
-            return
+        try:
+            if not _run_step(step, plan, output, progress, stop):
+                return
+        finally:
+            output.commit()
+    progress.stopped_early = False
 
 
-@contextlib.contextmanager
-def _results(step: Step, plan: Plan, output: Output, stop: Stop) -> Iterator[Iterator[Batch]]:
-    """Open the results of a step from whichever workers were asked for; the output is complete afterwards."""
-    options, record, frames, parts = plan.options, output.record, step.frames, output.parts_of(step)
+def _run_step(step: Step, plan: Plan, output: Output, progress: Progress, stop: Stop) -> bool:
+    """Do the frames of a step, images before rows, and rows in their order; tell whether all are done."""
+    options, record, parts = plan.options, output.record, output.parts_of(step)
     # whichever folder it is resumed from
     result = plan.output if is_url(plan.output) else os.path.realpath(plan.output)
     retry_of = result if step.retries else ""
     told = options.frame._replace(replaces=record.replaces, retry_of=retry_of, notes=bool(plan.files))
-    rows = BatchOptions(
-        line_form(options.result.form),
-        plan.further,
-        told,
-        verbose=options.running.verbose,
-        fail_fast=options.result.fail_fast,
-        parts=parts,
-    )
+    rows = BatchOptions(options.result, plan.further, told, options.running.verbose, parts)
     join, unit = partial(join_results, options=rows), parts.rows if parts else 1
-    work = work_on(frames, told, join=join, tell=lambda: record.read_as, unit=unit)
-    workers = workers_for(frames, options, [parts.output] if parts else [])
-    try:
-        with contextlib.closing(run_joined(frames, work, stop, workers)) as results:
-            yield results
-    finally:
-        output.commit()
+    work = work_on(step.frames, told, join=join, tell=lambda: record.read_as, unit=unit)
+    workers = workers_for(step.frames, options, [parts.output] if parts else [])
+    done, following = 0, iter(step.frames)
+    with contextlib.closing(run_joined(step.frames, work, stop, workers)) as batches:
+        for batch in batches:
+            frames = list(islice(following, len(batch)))
+            positions = step.positions[done : done + len(batch)]
+            done += len(batch)
+            if not positions:
+                output.restore(frames, batch)
+                continue
+            record.saw(batch.read_as)  # before their rows are written
+            add = output.replace if step.retries else output.append
+            add(positions, frames, batch)
+            progress.add_rows([frame.file for frame in frames], batch.figures, positions, batch.told)
+            if options.result.fail_fast and batch.figures.first_error >= 0:
+                return False
+    return done == len(step.frames)

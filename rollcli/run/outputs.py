@@ -136,13 +136,14 @@ def remove_marks(frames: Collection[Frame], writes: Sequence[Written]) -> None:
 _LISTED_AT_ONCE = 10_000
 
 
-def check_one_owner(writes: Iterable[tuple[Frame, Iterable[str]]], results: Iterable[str] = ()) -> None:
+def check_one_owner(frames: Iterable[Frame], writes: Sequence[Written], results: Iterable[str] = ()) -> None:
     """Check that no file is written twice, however differently its path is spelled.
 
     Parameters
     ----------
-    writes : iterable of (Frame, paths)
-        Each frame, and the files that are written for it.
+    frames : iterable of Frame
+    writes : sequence of Written
+        What is written for each of them.
     results : iterable of str
         The files that are written for the run.
 
@@ -152,8 +153,8 @@ def check_one_owner(writes: Iterable[tuple[Frame, Iterable[str]]], results: Iter
         Names the file and what it would be written for.
     """
     owner = {_place(path): "" for path in results}
-    for frame, paths in writes:
-        for path in paths:
+    for frame in frames if writes else ():
+        for path in every_path(frame, writes):
             place = _place(path)
             if place in owner:
                 raise UsageError(_written_twice(path, owner[place], frame.file))

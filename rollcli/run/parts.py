@@ -17,7 +17,7 @@ from rollcli.files.atomic import is_folder, is_there, remove_leftovers, sync_fil
 from rollcli.files.locking import exists_already, locked_folder, not_resumable
 from rollcli.files.storage import list_names, read_bytes, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url, located, public_name
-from rollcli.run.batch import Batch, Parts, Step, line_form, part_location
+from rollcli.run.batch import Batch, Parts, Step, part_location
 from rollcli.run.frame import Frame
 from rollcli.run.plan import Plan
 from rollcli.run.progress import RunSummary
@@ -83,8 +83,8 @@ class PartsOutput(Output):
         self._end_replacing()
 
     def _write_anew(self, number: int) -> None:
-        form, first = line_form(self._plan.format), number * self._part_rows
-        old = [results.format_row(row, form, self._plan.further) for row in _rows_of_part(self._plan, number)]
+        plan, first = self._plan, number * self._part_rows
+        old = [results.format_row(row, plan.format, plan.further) for row in _rows_of_part(plan, number)]
         path = part_inputs_path(self._plan.output, number)
         inputs = read_bytes(path)
         lines = [self._new_rows.get(*each) for each in enumerate(old, first)]

@@ -67,10 +67,7 @@ def make_plan(options: EstimateOptions) -> Plan:
             f"{plan.output}: rows of a result in parts (Parquet, or below a URL) keep their places: "
             "--update takes a result in one file of CSV or JSON Lines"
         )
-    if options.writes:
-        outputs.check_one_owner(
-            ((frame, outputs.every_path(frame, options.writes)) for frame in frames), plan.files
-        )
+    outputs.check_one_owner(frames, options.writes, plan.files)
     calibrations = calibration_files(options.calibration)
     outputs.check_inputs_are_kept(
         lambda: chain(calibrations, (path for frame in plan.frames for path in frame.reads())),

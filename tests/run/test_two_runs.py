@@ -42,7 +42,7 @@ def plan(bucket, tmp_path):
 
 def append(output, frames, first=0):
     """The rows of frames, as workers would return them."""
-    told = BatchOptions("csv", (), FrameOptions(notes=True), verbose=False, fail_fast=False)
+    told = BatchOptions(ResultOptions(), (), FrameOptions(notes=True))
     for at, frame in enumerate(frames, first):
         result = FrameResult(Row(frame.file, status="ok", roll_deg=1.0))
         output.append([at], [frame], join_results(Span([frame], 0, output.record.read_as), [result], told))
