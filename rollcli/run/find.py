@@ -1,6 +1,5 @@
 """Find the frames that a user named, and the calibration of each."""
 
-import contextlib
 import itertools
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -259,11 +258,12 @@ def _map_frames(options: FramesOptions) -> Sequence[Frame]:
         from rollcli.files.recordings.frames import maps_of_bag
 
         found_maps = [maps_of_bag(files, name, given.topic) for name, files in bags]
-        return _bag_frames(found_maps, make, given.every)
+        return _bag_frames(found_maps, make, options)
     if given.topic is not None:
         raise UsageError("--topic is of a bag (.bag, .db3, .mcap or a rosbag2 folder), and none is given")
-    with _search(options, MAP_ENDINGS, maps=True) as search:
-        found = find_inputs(given.inputs, search, files_from=given.files_from)
+    search = _search(options, MAP_ENDINGS, maps=True)
+    found = find_inputs(given.inputs, search, files_from=given.files_from)
+    _tell(search.notes, options)
     if video := next((each.name for each in found if is_video(each.location)), None):
         raise UsageError(
             f"{video}: is a video, of views and not of maps: give --side-by-side (estimate, disparity) "
@@ -272,14 +272,15 @@ def _map_frames(options: FramesOptions) -> Sequence[Frame]:
     return [make.frame(each) for each in found[:: given.every]]
 
 
-@contextlib.contextmanager
-def _search(options: FramesOptions, endings: tuple[str, ...], *, maps: bool = False) -> Iterator[Search]:
-    """Say, once the search is over, what it has noted."""
+def _search(options: FramesOptions, endings: tuple[str, ...], *, maps: bool = False) -> Search:
     given = options.inputs
-    search = Search(endings, given.recursive, given.include, given.exclude, options.folders, maps)
-    yield search
+    return Search(endings, given.recursive, given.include, given.exclude, options.folders, maps)
+
+
+def _tell(notes: Iterable[str], options: FramesOptions) -> None:
+    """Say what a search has noted, each once."""
     if not options.running.quiet:
-        say(*dict.fromkeys(search.notes))
+        say(*dict.fromkeys(notes))
 
 
 def _sorted_frames(options: FramesOptions) -> "SortedFrames":
@@ -333,15 +334,16 @@ def _pair_frames(options: FramesOptions) -> list[Frame]:
     if any(views):
         return _bag_pairs(options, make)
     videos = VIDEOS if pairs.side_by_side is not None else ()
-    with _search(options, (*IMAGE_ENDINGS, *videos)) as search:
-        if pairs.side_by_side is not None:
-            found = find_inputs(given.inputs, search, files_from=given.files_from)
-            matched = [(each, each) for each in found]
-        elif pairs.left is None or pairs.right is None:
-            raise UsageError("--left and --right are given together")
-        else:
-            matched = pair_inputs(pairs.left, pairs.right, search, match=pairs.match)
-        both = [views for pair in matched for views in _frames_of(*pair, pairs.side_by_side)]
+    search = _search(options, (*IMAGE_ENDINGS, *videos))
+    if pairs.side_by_side is not None:
+        found = find_inputs(given.inputs, search, files_from=given.files_from)
+        matched = [(each, each) for each in found]
+    elif pairs.left is None or pairs.right is None:
+        raise UsageError("--left and --right are given together")
+    else:
+        matched = pair_inputs(pairs.left, pairs.right, search, match=pairs.match)
+    both = [views for pair in matched for views in _frames_of(*pair, pairs.side_by_side)]
+    _tell(search.notes, options)
     taken = _each_of(given.every)
     return [make.frame(left, right) for left, right in both if taken(left)]
 
@@ -374,7 +376,7 @@ def _bag_pairs(options: FramesOptions, make: "_FrameMaker") -> list[Frame]:
 
     tolerance = round(options.topics.sync_tolerance * 1e6)
     found = [pairs_of_bag(files, name, left, right, tolerance) for name, files in bags]
-    return _bag_frames(found, make, options.inputs.every)
+    return _bag_frames(found, make, options)
 
 
 def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
@@ -400,12 +402,11 @@ def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
     return allowed
 
 
-def _bag_frames(bags: "Iterable[BagFrames]", make: "_FrameMaker", every: int) -> list[Frame]:
+def _bag_frames(bags: "Iterable[BagFrames]", make: "_FrameMaker", options: FramesOptions) -> list[Frame]:
     frames: list[Frame] = []
-    taken = _each_of(every)
+    taken = _each_of(options.inputs.every)
     for bag in bags:
-        if not make.quiet:
-            say(*dict.fromkeys(bag.notes))
+        _tell(bag.notes, options)
         frames += [make.frame(left, right, bag.calibration) for left, right in bag.frames if taken(left)]
     return frames
 
@@ -414,8 +415,7 @@ class _FrameMaker:
     """Makes frames, with the masks and calibrations that were named: one for all, or one of each stem."""
 
     def __init__(self, options: FramesOptions) -> None:
-        self.calibrations, self.quiet = Calibrations(options.calibration), options.running.quiet
-        self._masks = Masks(options.region.mask)
+        self._calibrations, self._masks = Calibrations(options.calibration), Masks(options.region.mask)
 
     def frame(self, left: Input, right: Input | None = None, calibration: Calibration | None = None) -> Frame:
         """Make the frame of a map, or of the views of a pair; `calibration` is that of its bag."""
@@ -428,5 +428,5 @@ class _FrameMaker:
             right_path=right.location if right else "",
             relative=left.relative if not foreign or names_a_file(left.relative) else "",
             mask=self._masks.of(left.name),
-            calibration=self.calibrations.of(left.name) or calibration,
+            calibration=self._calibrations.of(left.name) or calibration,
         )
