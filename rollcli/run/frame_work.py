@@ -60,6 +60,6 @@ def workers_for(frames: Sequence[Frame], options: FramesOptions, parts: Iterable
     `parts`: the folder of those parts of a result that they write.
     """
     files = tuple(file_of(path) for frame in (*frames[:1], *frames[-1:]) for path in frame.reads())
-    folders, running = dict.fromkeys(options.folders), options.running
+    folders, running = options.folders, options.running
     threads = tasks_in_hand((*files, *folders))
     return Workers(running.jobs, running.scheduler, files, (*folders, *parts), threads)

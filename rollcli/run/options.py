@@ -433,7 +433,7 @@ class FramesOptions(ABC):
     @property
     def folders(self) -> list[str]:
         """Where files are written: no inputs are searched there."""
-        return [each.folder for each in self.writes]
+        return list(dict.fromkeys(each.folder for each in self.writes))
 
     @property
     def frame(self) -> FrameOptions:

@@ -34,6 +34,7 @@ PLACES = {
     "a file in": ["estimate", "@/maps/frame0.png", "-o", "rolls.csv"],
     "a result out": ["estimate", "maps", "-o", "@/rolls.csv"],
 }
+VIEWS = ["--left", "maps/frame0.png", "--right", "maps/frame1.png", "--overwrite"]
 
 
 def refusal(folder, *words, **variables):
@@ -71,6 +72,7 @@ def test_what_a_store_objects_to_is_said_before_any_work(bucket, store, tmp_path
         (["estimate", "maps", "-o", "s3://nowhere/rolls.csv"], "there is no such bucket"),
         (["estimate", "maps", "--derotated", "s3://nowhere/up", "--overwrite"], "there is no such bucket"),
         (["derotate", "maps", "--roll", "1", "-o", "s3://nowhere/up"], "there is no such bucket"),
+        (["disparity", *VIEWS, "-o", "d", "--preview", "s3://nowhere/p"], "there is no such bucket"),
         (["rig", "s3://maps/none.csv"], "there is no such object"),
     ],
 )
