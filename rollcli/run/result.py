@@ -29,14 +29,7 @@ from rollcli.run.result_file import (
     open_result,
     row_lines,
 )
-from rollcli.run.resume import (
-    KeptRows,
-    Output,
-    RunRecord,
-    arranged,
-    is_replaceable_record,
-    new_record,
-)
+from rollcli.run.resume import KeptRows, Output, RunRecord, arranged, is_replaceable_record, new_record
 
 
 class StreamOutput(Output):
