@@ -122,7 +122,7 @@ def test_a_frame_without_a_row_of_its_own_stands_as_an_error_until_it_is_done(fo
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("rollcli.run.estimate._results", fail)
+        patch.setattr("rollcli.run.estimate.run_joined", fail)
         estimate(folder, *IMAGES, "--update", status=3)
     rows = (folder / "rolls.csv").read_text().splitlines()
     assert rows[2].startswith("maps/frame0a.png,,error")
