@@ -75,63 +75,52 @@ def given_calibration(calibration: Calibration | str | os.PathLike[str] | None) 
     return calibration
 
 
-class Calibrations:
-    """What a user said of the calibration, found and read.
+def calibration_finder(given: CalibrationOptions) -> Callable[[str], Calibration | None]:
+    """Return what finds the calibration of a frame by its name: what a user said of it is found and read.
+
+    One is for all frames; of a folder it is that of the frame's stem, or of the stem up to one of its
+    underscores.
 
     Raises
     ------
     UsageError, InputError
         See `parse_calibration`; or there is no such file.
     """
+    if len(given.calib) != 1 or not is_place(given.calib[0]):
+        one = _read(given.calib, given) if given.given else None
+        return lambda name: one
+    files = _files(given.calib[0])
+    by_stem = gathered((PurePosixPath(path).stem.removesuffix(_MARK), path) for path in files)
+    fetched = fetch_all(filter(is_url, files), MAX_BYTES)  # one after the other takes long
+    read = cache(lambda path: _read([path], given, fetched))  # one may be for a thousand frames
 
-    def __init__(self, given: CalibrationOptions) -> None:
-        self.given, self._calib = given.given, given.calib
-        self._by_stem: dict[str, list[str]] | None = None
-        self._one: Calibration | None = None
-        fetched: dict[str, bytes] = {}
-        if len(given.calib) == 1 and is_place(given.calib[0]):
-            files = _files(given.calib[0])
-            self._by_stem = gathered((PurePosixPath(path).stem.removesuffix(_MARK), path) for path in files)
-            fetched = fetch_all(filter(is_url, files), MAX_BYTES)  # one after the other takes long
-        elif given.given:
-            self._one = _read(given.calib, given)
-        self._read = cache(lambda path: _read([path], given, fetched))  # one may be for a thousand frames
-
-    def of(self, name: str) -> Calibration | None:
-        """Return the calibration of a frame: of its stem, or of the stem up to one of its underscores."""
-        if self._by_stem is None:
-            return self._one
+    def of(name: str) -> Calibration:
         stem = PurePosixPath(frame_name(name)).stem
-        while stem not in self._by_stem and "_" in stem:  # KITTI's 000010.txt is for 000010_10.png
+        while stem not in by_stem and "_" in stem:  # KITTI's 000010.txt is for 000010_10.png
             stem = stem.rpartition("_")[0]
-        return self._read(_only(self._by_stem, stem, "calibration", name, self._calib[0]))
+        return read(_only(by_stem, stem, "calibration", name, given.calib[0]))
+
+    return of
 
 
-class Masks:
-    """The masks that a user named: none, one for all frames, or a folder with one of each stem.
+def mask_finder(mask: str | None) -> Callable[[str], str | None]:
+    """Return what finds the mask of a frame by its name: none, one for all, or of a folder that of its stem.
 
     Raises
     ------
     UsageError
         There is no such file or folder.
     """
-
-    def __init__(self, mask: str | None) -> None:
-        self._mask, self._by_stem = mask, None
-        if mask is not None and (is_place(mask) or is_archive(mask)):
-            found = find_inputs([mask], Search(recursive=True))
-            self._by_stem = gathered((Path(frame_name(each.name)).stem, each.location) for each in found)
-        elif mask is not None and not (is_url(mask) or is_file(file_of(mask))):
-            raise UsageError(f"{mask}: no such mask file or folder")
-
-    def of(self, name: str) -> str | None:
-        """Return the mask of a frame."""
-        if self._by_stem is None:
-            return self._mask
-        return _only(self._by_stem, PurePosixPath(frame_name(name)).stem, "mask", name, self._mask)
+    if mask is not None and (is_place(mask) or is_archive(mask)):
+        found = find_inputs([mask], Search(recursive=True))
+        by_stem = gathered((Path(frame_name(each.name)).stem, each.location) for each in found)
+        return lambda name: _only(by_stem, PurePosixPath(frame_name(name)).stem, "mask", name, mask)
+    if mask is not None and not (is_url(mask) or is_file(file_of(mask))):
+        raise UsageError(f"{mask}: no such mask file or folder")
+    return lambda name: mask
 
 
-def _only(by_stem: Mapping[str, Sequence[str]], stem: str, what: str, name: str, folder: str | None) -> str:
+def _only(by_stem: Mapping[str, Sequence[str]], stem: str, what: str, name: str, folder: str) -> str:
     """Return the one path of a stem; which of several is meant for a frame, nobody can tell."""
     paths = by_stem.get(stem, ())
     if not paths:
@@ -415,7 +404,8 @@ class _FrameMaker:
     """Makes frames, with the masks and calibrations that were named: one for all, or one of each stem."""
 
     def __init__(self, options: FramesOptions) -> None:
-        self._calibrations, self._masks = Calibrations(options.calibration), Masks(options.region.mask)
+        self._calibration = calibration_finder(options.calibration)
+        self._mask = mask_finder(options.region.mask)
 
     def frame(self, left: Input, right: Input | None = None, calibration: Calibration | None = None) -> Frame:
         """Make the frame of a map, or of the views of a pair; `calibration` is that of its bag."""
@@ -427,6 +417,6 @@ class _FrameMaker:
             path=left.location,
             right_path=right.location if right else "",
             relative=left.relative if not foreign or names_a_file(left.relative) else "",
-            mask=self._masks.of(left.name),
-            calibration=self._calibrations.of(left.name) or calibration,
+            mask=self._mask(left.name),
+            calibration=self._calibration(left.name) or calibration,
         )

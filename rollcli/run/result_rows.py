@@ -1,7 +1,7 @@
 """The row of a result that each map has, and the frame that each row has."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from rollcli.files.naming import listed
 from rollcli.files.results import Row, read_result, run_path
 from rollcli.files.stores.locations import is_remote, is_url
 from rollcli.messages import say
-from rollcli.run.find import Masks
+from rollcli.run.find import mask_finder
 from rollcli.run.frame import Frame
 from rollcli.run.options import FrameOptions
 from rollcli.run.resume import recorded_options
@@ -55,10 +55,10 @@ def rows_of(
     ]
     if elsewhere:
         recorded = recorded_options(read.run, run_path(result))
-        masks = _masks_of(recorded, result)
+        mask_of = _masks_of(recorded, result)
         for at in {round(i * (len(elsewhere) - 1) / (_COMPARED - 1)): None for i in range(_COMPARED)}:
             frame, row = elsewhere[at]
-            if not _is_copy(replace(frame, mask=masks.of(row.file)), row, recorded):
+            if not _is_copy(replace(frame, mask=mask_of(row.file)), row, recorded):
                 differ = f"its row is of {row.file}, and not of {frame.file}"
                 raise UsageError(f"{result}: {differ}: give the result of these maps")
     _tell_suspects(matched, result, skip_suspect=skip_suspect, quiet=quiet)
@@ -71,11 +71,11 @@ def frame_of_row(row: Row, result: str) -> Frame:
     return Frame(row.file, row.right_file, path, right, relative=row.file, mask=None)
 
 
-def _masks_of(recorded: FrameOptions, result: str) -> Masks:
+def _masks_of(recorded: FrameOptions, result: str) -> Callable[[str], str | None]:
     """Find the masks of a result's run, without which its maps have other angles."""
     mask = recorded.region.mask
     try:
-        return Masks(mask and _located(mask, result))
+        return mask_finder(mask and _located(mask, result))
     except UsageError as error:
         raise UsageError(f"{result}: its maps are known by the mask that they had: {error}") from error
 

@@ -20,7 +20,7 @@ from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.quantities import ALIGNMENT, QUANTITIES, ROLL, SIZE
 from rollcli.rig.quantities import COLUMNS as QUANTITY_COLUMNS
 from rollcli.rig.words import findings
-from rollcli.run.find import Calibrations
+from rollcli.run.find import calibration_finder
 from rollcli.run.frame import Frame
 from rollcli.run.options import FrameOptions, RigOptions
 from rollcli.run.outputs import check_named_once, listed_only
@@ -230,7 +230,7 @@ def run_rig(options: RigOptions) -> int:
         after, later, more = _assessed([options.against], options)
         missing, notes = missing or later, [*notes, *more]
         changes = {each.name: difference(rig.now(each), after.now(each), each) for each in QUANTITIES}
-    calibration = Calibrations(options.calibration).of(rig.frames.files[-1])
+    calibration = calibration_finder(options.calibration)(rig.frames.files[-1])
     health = health_of(rig, calibration, 1.0 if calibration is None else _downscale(options.results[-1]))
     checks = run_checks(rig, options.gates, missing, changes.get(ROLL.name))
     found = Findings(rig, checks, after, changes, health)
