@@ -8,7 +8,7 @@ writes.
 
 import contextlib
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 from rollcli.errors import InputError, UsageError
 from rollcli.extras import require_extra
@@ -42,7 +42,6 @@ class PartsOutput(Output):
             output, self._plan.format, self._plan.further, self._part_rows, (), 0, record.run, of_rows
         )
         self._waiting: list[tuple[int, bytes, bytes]] = []  # positions, rows, and the lines of their inputs
-        self._images: list[str] = []  # those of the part that is being filled
         self._checked = time.monotonic()
         self._written = kept.count - len(kept.holes)
 
@@ -71,9 +70,6 @@ class PartsOutput(Output):
             self._write()
         super().finish(summary)
         _remove_leftovers(self._plan)  # of workers that have died
-
-    def _keep_images(self, images: Iterable[str]) -> None:
-        self._images += images
 
     def commit(self) -> None:
         """Write those parts anew of which rows are replaced; a part that is new waits until it is full."""

@@ -3,22 +3,22 @@
 import contextlib
 import io
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, islice
+from pathlib import Path
 
 from rollcli.errors import InputError, UsageError
-from rollcli.files.atomic import is_there, remove_leftovers
+from rollcli.files.atomic import is_there, remove_leftovers, sync_files
 from rollcli.files.locking import exists_already, not_resumable
 from rollcli.files.results import format_header, parse_rows, run_path
 from rollcli.files.storage import is_stream, open_stream
 from rollcli.files.stores.locations import base_name
 from rollcli.run.batch import Batch
 from rollcli.run.frame import Frame
-from rollcli.run.outputs import local_files
 from rollcli.run.parts import kept_in_parts, open_parts
 from rollcli.run.plan import Plan
 from rollcli.run.result_file import (
-    DurableRows,
     Inputs,
     ResultFile,
     data_of,
@@ -45,24 +45,61 @@ class StreamOutput(Output):
         self._write(b"".join(batch.lines))
 
 
+_MOST_IMAGES = 512
+_LONGEST_S = 1.0  # a row waits no longer for the others of its group
+_SHARE = 100  # a group lasts so many times as long as the last one took to sync: 1 % of the time at most
+
+
 class FileOutput(Output):
-    """Rows to a locked file, FILE.inputs and FILE.run.json beside it; images are durable before their row."""
+    """Rows to a locked file, FILE.inputs and FILE.run.json beside it; images are durable before their row.
+
+    Rows without images are written at once; a killed run loses none of them. What a row was made from is
+    written before it (see `result_file`), and counts without it for nothing.
+    """
 
     def __init__(self, file: ResultFile, inputs: ResultFile, record: RunRecord, kept: KeptRows) -> None:
         super().__init__(record, kept)
-        self._file, self._inputs, self._rows = file, inputs, DurableRows(file, inputs)
+        self._file, self._inputs, self._written = file, inputs, 0
+        self._rows: list[bytes] = []  # which wait for their images
+        self._folders: set[Path] = set()  # whose names are on the disk
+        self._last, self._wait_s = time.monotonic(), 0.0
 
     def append(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
         """Add the rows, which may wait for others."""
-        images = local_files(frames, batch.figures.status, self._plan.options.writes)
-        self._rows.append(batch.lines, batch.notes, images)
+        self._take_images(frames, batch.figures.status, batch.lines, batch.notes)
 
-    def _keep_images(self, images: Iterable[str]) -> None:
-        self._rows.append((), (), images)
+    def _take_images(
+        self, frames: Sequence[Frame], status: bytes, rows: Sequence[bytes] = (), notes: Sequence[bytes] = ()
+    ) -> None:
+        self._inputs.append(b"".join(notes))
+        super()._take_images(frames, status)
+        self._rows += rows
+        if not self._images:
+            self._write()
+        if time.monotonic() - self._last >= self._wait_s or len(self._images) >= _MOST_IMAGES:
+            self._sync()
+
+    def _sync(self) -> None:
+        """Force the images to the disk, then write the rows and force them too."""
+        start = time.monotonic()
+        if self._images:
+            sync_files(self._images, self._folders)
+            self._images.clear()
+        self._write()
+        self._inputs.sync()
+        self._file.sync()
+        self._last = time.monotonic()
+        self._wait_s = min(_SHARE * (self._last - start), _LONGEST_S)
+
+    def _write(self) -> None:
+        rows, self._rows = self._rows, []  # first: what follows an interrupt must not write one again
+        if rows:
+            self._file.append(b"".join(rows))
+            self._written += len(rows)
 
     def commit(self) -> None:
         """Force the images and rows that were added to the disk."""
-        self._rows.commit()
+        self._sync()
         if self._new_rows:
             writes = [
                 (self._file, self._new_rows, self._plan.format),
@@ -76,7 +113,7 @@ class FileOutput(Output):
 
     def hint(self) -> str:
         """Say that --resume continues, if rows were written and their file still is there."""
-        rows = self.kept.count + self._rows.written
+        rows = self.kept.count + self._written
         return f"; {rows} rows are kept, continue with --resume" if rows and self._file.is_there() else ""
 
 

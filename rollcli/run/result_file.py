@@ -1,4 +1,4 @@
-"""A result as a file, with rows that reach the disk, locked against a second run; and FILE.inputs beside it.
+"""A result as a file of whole rows, locked against a second run; and FILE.inputs beside it.
 
 FILE.inputs says what each row was made from, so that a later run knows what has changed since. Of a result
 in parts it is a folder, with a file for each part. A line of fixed length stands for each row, in their
@@ -12,8 +12,7 @@ import io
 import os
 import re
 import stat
-import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
 from hashlib import blake2b
 from itertools import combinations
@@ -21,7 +20,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rollcli.errors import InputError, OutputError, RollcliError, UsageError, output_error, writing
-from rollcli.files.atomic import atomic_file, look_at, sync_files, write_atomic
+from rollcli.files.atomic import atomic_file, look_at, write_atomic
 from rollcli.files.locking import locked, take_lock
 from rollcli.files.results import FURTHER, Format, format_header, part_name
 from rollcli.files.storage import Note, noting, read_frame, state_of
@@ -241,75 +240,6 @@ def _reopen(descriptor: int, path: str, flags: int) -> None:
         os.dup2(opened, descriptor, inheritable=False)
     finally:
         os.close(opened)
-
-
-_MOST_IMAGES = 512
-_LONGEST_S = 1.0  # a row waits no longer for the others of its group
-_SHARE = 100  # a group lasts so many times as long as the last one took to sync: 1 % of the time at most
-
-
-class DurableRows:
-    """Collects rows, forces their images to the disk, then writes them and forces them too.
-
-    Rows without images are written at once; a killed run loses none of them. What a row was made from is
-    written before it (see `inputs`), and counts without it for nothing.
-
-    Attributes
-    ----------
-    written : int
-        The number of rows in the file that this object wrote.
-    """
-
-    def __init__(self, file: ResultFile, inputs: ResultFile) -> None:
-        self.written = 0
-        self._file, self._inputs = file, inputs
-        self._rows: list[bytes] = []
-        self._images: list[str] = []
-        self._folders: set[Path] = set()  # whose names are on the disk
-        self._last, self._wait_s = time.monotonic(), 0.0
-
-    def append(self, rows: Sequence[bytes], inputs: Sequence[bytes], images: Iterable[str]) -> None:
-        """Add rows, the lines of their inputs, and the images that must be on the disk before them.
-
-        There may be images alone, whose rows are in the result already.
-
-        Raises
-        ------
-        OutputError
-            The disk does not take an image or a row.
-        """
-        self._inputs.append(b"".join(inputs))
-        self._images.extend(images)
-        if self._rows or self._images:
-            self._rows.extend(rows)
-        else:
-            self._write(rows)
-        if time.monotonic() - self._last >= self._wait_s or len(self._images) >= _MOST_IMAGES:
-            self.commit()
-
-    def commit(self) -> None:
-        """Force everything to the disk that was added.
-
-        Raises
-        ------
-        OutputError
-            The disk does not take it.
-        """
-        start = time.monotonic()
-        if self._images:
-            sync_files(self._images, self._folders)
-            self._images.clear()
-        rows, self._rows = self._rows, []  # first: a commit after an interrupt must not write one again
-        self._write(rows)
-        self._inputs.sync()
-        self._file.sync()
-        self._last = time.monotonic()
-        self._wait_s = min(_SHARE * (self._last - start), _LONGEST_S)
-
-    def _write(self, rows: Sequence[bytes]) -> None:
-        if rows:
-            self._file.append(b"".join(rows))
-            self.written += len(rows)
 
 
 _PART_ENDING = "inputs"

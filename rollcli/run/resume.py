@@ -424,6 +424,7 @@ class Output:
         # what takes the place of kept rows, by their positions, and of the lines of their inputs
         self._new_rows: dict[int, bytes] = {}
         self._new_notes: dict[int, bytes] = {}
+        self._images: list[str] = []  # which must be on the disk before the rows that come next
 
     def parts_of(self, step: Step) -> Parts | None:
         """Say where workers write the rows of a step; None: all come back."""
@@ -466,10 +467,7 @@ class Output:
         self._take_images(frames, batch.figures.status)
 
     def _take_images(self, frames: Sequence[Frame], status: bytes) -> None:
-        self._keep_images(outputs.local_files(frames, status, self._plan.options.writes))
-
-    def _keep_images(self, images: Iterable[str]) -> None:
-        """Have images forced to the disk before the rows that come next are written."""
+        self._images += outputs.local_files(frames, status, self._plan.options.writes)
 
     def _end_replacing(self) -> None:
         """Forget the rows that are written, and what told their images from those of other programs."""

@@ -2,10 +2,26 @@
 
 import os
 import sys
+from pathlib import Path
 
 import pytest
 
-from rollcli.run.result_file import DurableRows, open_result
+from rollcli.files.results import STATUSES
+from rollcli.run.batch import Batch
+from rollcli.run.frame import Frame, ReadAs
+from rollcli.run.options import (
+    EstimateOptions,
+    ImageOptions,
+    InputOptions,
+    MethodOptions,
+    ResultOptions,
+    RunningOptions,
+)
+from rollcli.run.plan import Plan
+from rollcli.run.progress import Figures
+from rollcli.run.result import FileOutput
+from rollcli.run.result_file import open_result
+from rollcli.run.resume import KeptRows, RunRecord
 from tests.run_cli import contents, keep_rows, rollcli, write_maps
 from tests.slow import mostly_slow
 
@@ -25,25 +41,43 @@ class WatchedFile:
     def sync(self):
         self.synced = len(self.rows)
 
+    def is_there(self):
+        return True
 
-def image(folder, number):
-    path = folder / f"{number}.png"
-    path.write_bytes(b"image")
-    return path
+
+def plan_of(folder, count):
+    """The plan of a run over so many maps, whose workers have written an image of each."""
+    options = EstimateOptions(
+        inputs=InputOptions(),
+        running=RunningOptions(),
+        method=MethodOptions(),
+        images=ImageOptions(derotated=str(folder)),
+        result=ResultOptions(output=str(folder / "rolls.csv")),
+    )
+    names = [f"{number}.png" for number in range(count)]
+    for name in names:
+        (folder / name).write_bytes(b"image")
+    return Plan(options, [Frame(name, "", name, "", name, None) for name in names])
+
+
+def add(output, frame, position, row, line, status="ok"):
+    """Add a row and the line of its inputs; an error has no image."""
+    figures = Figures(bytes([STATUSES.index(status)]), {})
+    output.append([position], [frame], Batch(figures, 0, [row], [line], ReadAs(), []))
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows forces no folders")
 def test_a_row_is_written_after_its_images_and_their_folder_are_on_the_disk(tmp_path, synced):
-    file = WatchedFile(synced)
-    rows = DurableRows(file, WatchedFile([]))
-    paths = [image(tmp_path, number) for number in range(40)]
-    for number, path in enumerate(paths):
-        rows.append([b"%d " % number], [b"read"], [str(path)])
-    rows.commit()
+    file, plan = WatchedFile(synced), plan_of(tmp_path, 40)
+    output = FileOutput(file, WatchedFile([]), RunRecord(plan), KeptRows(plan))
+    for number, frame in enumerate(plan.frames):
+        add(output, frame, number, b"%d " % number, b"read")
+    output.commit()
     assert list(file.rows) == [b"%d" % number for number in range(40)]
-    for path, forced in zip(paths, file.rows.values(), strict=True):
-        assert {path.stat().st_ino, tmp_path.stat().st_ino} <= forced
-    assert file.synced == rows.written == 40
+    for frame, forced in zip(plan.frames, file.rows.values(), strict=True):
+        assert {(tmp_path / frame.file).stat().st_ino, tmp_path.stat().st_ino} <= forced
+    assert file.synced == 40
+    assert output.hint() == "; 40 rows are kept, continue with --resume"
 
 
 @pytest.fixture
@@ -84,12 +118,16 @@ def test_images_that_cannot_be_made_again_end_the_resume_with_one_line(finished)
     assert "the images of maps/frame0.png cannot be made again: is no PNG, TIFF, " in done.err
 
 
+TRACED = tuple(str(Path("run", name)) for name in ("result.py", "result_file.py", "resume.py", "outputs.py"))
+
+
 def interrupted_at(step, work):
     """Run `work` until a line of a result's modules, as a second Ctrl-C would; return whether it came."""
     left = [step]
 
     def trace(frame, event, argument):
-        if "durable_rows" not in frame.f_code.co_filename and "result_file" not in frame.f_code.co_filename:
+        path = frame.f_code.co_filename
+        if path != __file__ and not path.endswith(TRACED):
             return None
         if event == "line":
             left[0] -= 1
@@ -110,19 +148,20 @@ def interrupted_at(step, work):
 
 def test_a_second_interrupt_at_any_line_writes_no_row_twice_and_leaves_none_out(tmp_path):
     expected, step, came = [b"%d\n" % number for number in range(6)], 0, True
+    plan = plan_of(tmp_path, len(expected))
     while came:
         step += 1
         path = tmp_path / f"{step}.csv"
         with open_result(str(path)) as file, open_result(f"{path}.inputs") as inputs:
-            rows = DurableRows(file, inputs)
+            output = FileOutput(file, inputs, RunRecord(plan), KeptRows(plan))
 
-            def work(rows=rows):
+            def work(output=output):
                 for number, row in enumerate(expected):
-                    rows.append([row], [row], [str(image(tmp_path, number))] if number else [])
-                rows.commit()
+                    add(output, plan.frames[number], number, row, row, "ok" if number else "error")
+                output.commit()
 
             came = interrupted_at(step, work)
-            rows.commit()  # as the run does whatever ended it
+            output.commit()  # as the run does whatever ended it
         lines = path.read_bytes().splitlines(keepends=True)
         assert lines == expected[: len(lines)], step
         read = (tmp_path / f"{step}.csv.inputs").read_bytes().splitlines(keepends=True)
