@@ -62,18 +62,16 @@ def written_at(result: str) -> str:
 
 def common_run(runs: Sequence[Mapping[str, Any] | None]) -> Mapping[str, Any] | None:
     """Return what the records of several runs have in common, and every encoding that was seen."""
-    first = runs[0]
-    if first is None or len(runs) == 1 or any(each is None for each in runs):
-        return first if len(runs) == 1 else None
+    if len(runs) == 1 or None in runs:
+        return runs[0] if len(runs) == 1 else None
     known = [each for each in runs if each is not None]
     encodings = [name for each in known for name in each.get("encoding") or ()]
-    options = {
-        name: value
-        for name, value in first.get("options", {}).items()
-        if all(each.get("options", {}).get(name) == value for each in known)
-    }
-    same = {name: first[name] for name in first if all(each.get(name) == first[name] for each in known)}
-    return {**same, "options": options, "encoding": list(dict.fromkeys(encodings))}
+    options = _in_common([each.get("options", {}) for each in known])
+    return {**_in_common(known), "options": options, "encoding": list(dict.fromkeys(encodings))}
+
+
+def _in_common(runs: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    return {name: value for name, value in runs[0].items() if all(each.get(name) == value for each in runs)}
 
 
 def option_lines(run: Mapping[str, Any] | None) -> list[tuple[str, str]]:
