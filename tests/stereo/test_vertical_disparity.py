@@ -84,7 +84,8 @@ def test_a_disparity_that_hides_the_offset_is_taken_back(noise):
 
     found = measure_misalignment(Texture.of((left, right)), wall(10.4), rounds=30)
 
-    assert found.misalignment.offset == pytest.approx(0.4, abs=0.03)
+    y, x = np.indices(SHAPE) - (np.array(SHAPE)[:, None, None] - 1) / 2
+    assert found.misalignment.down(x, y).mean() == pytest.approx(0.4, abs=0.03)
 
 
 @pytest.mark.parametrize("shape", [(7, 100), (100, 7)])
@@ -143,7 +144,7 @@ def test_what_lies_between_pixels_is_measured_without_a_pull_to_whole_ones(scale
 def seen_at(lies, noise=0.0, count=400, seed=0):
     rng = np.random.default_rng(seed)
     x, y = rng.uniform(-150, 150, count), rng.uniform(-80, 80, count)
-    shift = lies.offset + lies.rotation * x + lies.scale * y + lies.twist * x * y
+    shift = lies.down(x, y)
     shift += rng.normal(0, 1, count) * noise
     weight, near = rng.uniform(2, 50, count), rng.uniform(0, 60, count)
     parts = x, y, near, shift, weight
@@ -153,9 +154,9 @@ def seen_at(lies, noise=0.0, count=400, seed=0):
 def test_a_fit_without_noise_is_exact_and_outliers_do_not_move_it():
     lies = Misalignment(0.5, -0.004, 0.006, 5e-5)
     seen = seen_at(lies)
-    exact, _, spread, _ = row_fit.fit_rows(seen)
-    assert exact.shifts(160, 300) == pytest.approx(lies.shifts(160, 300), abs=1e-4)
-    assert spread == pytest.approx(0.001, abs=2e-4)
+    exact = row_fit.fit_rows(seen)
+    assert exact.lies.shifts(160, 300) == pytest.approx(lies.shifts(160, 300), abs=1e-4)
+    assert exact.spread == pytest.approx(0.001, abs=2e-4)
     seen.shift[::6] += 5
     robust = row_fit.fit_rows(seen).lies
     assert robust.shifts(160, 300) == pytest.approx(lies.shifts(160, 300), abs=1e-2)
@@ -186,6 +187,18 @@ def blocks_of(rng, field, *, below_horizon=False, noise=0.1, count=1500):
     shift = field(x, y, near) + noise * rng.normal(size=count)
     parts = x, y, near, shift, np.full(count, 20.0)
     return SeenBlocks(*(part.astype(np.float32) for part in parts))
+
+
+@pytest.mark.parametrize(("offset", "share"), [(4.0, 1.0), (-4.0, 1.0), (0.0, 0.0)])
+def test_rows_curve_as_far_as_their_offset_may_be_a_pitch(offset, share):
+    curve = 4.0 / (0.7 * 1200) ** 2 * (np.sign(offset) or 1)  # 0.18 px in the first and the last row
+    seen = blocks_of(np.random.default_rng(5), lambda x, y, near: offset + curve * y**2, noise=0.2)
+    lies = LEVEL
+    for _ in range(4):  # as rounds of measuring do
+        left = seen.shift - lies.down(seen.x, seen.y)
+        lies += row_fit.fit_rows(seen._replace(shift=left), lies).lies
+    assert lies.curve == pytest.approx(share * curve, abs=0.2 * abs(curve))
+    assert lies.offset == pytest.approx(offset + (1 - share) * curve * 180**2 / 3, abs=0.03)
 
 
 def support_of(field, **street):
