@@ -29,8 +29,9 @@ from rollcli.run.result_rows import frame_of_row
 from rollcli.run.resume import recorded_options
 from rollcli.run.rig_gates import check_options, health_of, run_checks, status_of
 from rollcli.run.rig_text import FORMATS, NO_COLUMNS, Findings, correction_text
+from rollcli.stereo.alignment import Measured
+from rollcli.stereo.correction import DriveRows
 from rollcli.stereo.match import match_pair
-from rollcli.stereo.misalignment import ColumnSupport
 from rollcli.stereo.row_fit import ColumnEvidence, column_support
 
 COLUMNS = (*QUANTITY_COLUMNS, *SIZE)
@@ -238,9 +239,9 @@ def run_rig(options: RigOptions) -> int:
     data = FORMATS[options.format](found).encode("utf-8", "surrogateescape")
     write_output(options.output, data, overwrite=overwrite)
     if options.correction is not None:
-        columns = None if health is None else columns_of_drive(rig, options.results)
-        correction = correction_text(health, columns, options.results).encode()
-        if columns is None and not options.running.quiet:
+        rows = None if health is None else rows_of_drive(rig, options.results)
+        correction = correction_text(health, rows, options.results).encode()
+        if rows is None and not options.running.quiet:
             say(f"{options.correction}: {NO_COLUMNS}")
         write_output(options.correction, correction, overwrite=overwrite)
     if not options.running.quiet:
@@ -260,18 +261,18 @@ _PAIRS = 24  # matched again, a few seconds: 8 of rendered roads tell a scale to
 _FEWEST = 4
 
 
-def columns_of_drive(rig: RigAssessment, results: Sequence[str]) -> ColumnSupport | None:
-    """Match some pairs of the last drive again, and put together what their rows say of the columns.
+def rows_of_drive(rig: RigAssessment, results: Sequence[str]) -> DriveRows | None:
+    """Match some pairs of the last drive again, and put together what their rows say.
 
     One pair of an empty road cannot tell a right view that is larger from rows that are bent; the pairs of a
     drive can, for its rig is one since its last jump.
 
     Returns
     -------
-    ColumnSupport or None
+    DriveRows or None
         Pixels of the size matched at; None where too few of the pairs can be read here.
     """
-    found: list[ColumnEvidence] = []
+    found: list[Measured] = []
     for frame, options in _pairs(rig, results):
         try:
             left, right = read_views(frame, options)
@@ -280,9 +281,13 @@ def columns_of_drive(rig: RigAssessment, results: Sequence[str]) -> ColumnSuppor
         except FRAME_ERRORS:  # the pairs that are left may be enough
             continue
         if measured is not None:
-            found.append(measured.evidence)
-    same = [each for each in found if (each.shape, each.factor) == (found[-1].shape, found[-1].factor)]
-    return column_support(ColumnEvidence.of_drive(same)) if len(same) >= _FEWEST else None
+            found.append(measured)
+    sizes = [(each.rows.shape, each.rows.factor) for each in found]
+    same = [each for each, size in zip(found, sizes, strict=True) if size == sizes[-1]]
+    if len(same) < _FEWEST:
+        return None
+    columns = column_support(ColumnEvidence.of_drive([each.evidence for each in same]))
+    return DriveRows(columns, float(np.median([each.misalignment.curve for each in same])))
 
 
 def _pairs(rig: RigAssessment, results: Sequence[str]) -> Iterator[tuple[Frame, FrameOptions]]:

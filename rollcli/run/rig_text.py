@@ -12,8 +12,7 @@ from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.quantities import ALIGNMENT, QUANTITIES, ROLL, Quantity
 from rollcli.rig.words import answer, counts, drift_in_words, findings, frame_name, now_in_words
 from rollcli.run.rig_gates import DISTANCES, NOT_SEEN, Check, Health
-from rollcli.stereo.correction import columns_as_text
-from rollcli.stereo.misalignment import ColumnSupport
+from rollcli.stereo.correction import DriveRows
 
 _DIGITS = 6
 
@@ -254,8 +253,8 @@ _CALL = (
 NO_COLUMNS = "too few pairs of one size can be read here: each tells alone what of a scale is in the columns"
 
 
-def correction_text(health: Health | None, columns: ColumnSupport | None, results: Sequence[str]) -> str:
-    """Return the JSON of a correction; `columns` are of the size matched at, if the drive tells.
+def correction_text(health: Health | None, rows: DriveRows | None, results: Sequence[str]) -> str:
+    """Return the JSON of a correction; `rows` are of the size matched at, if the drive tells.
 
     Raises
     ------
@@ -269,10 +268,10 @@ def correction_text(health: Health | None, columns: ColumnSupport | None, result
         **alignment_values(health),
         "width": width,
         "height": height,
-        **({"columns": columns_as_text(columns)} if columns is not None else {}),
+        **({} if rows is None else rows.as_text(height, width)),
         "matrix": health.misalignment.matrix(height, width),
         "opencv": _CALL,
-        "note": "matrix: from a pixel of the corrected right view to the given one, without the twist, "
-        f"which no matrix holds; {NOT_SEEN}",
+        "note": "matrix: from a pixel of the corrected right view to the given one, without twist "
+        f"and bend, which no matrix holds; {NOT_SEEN}",
     }
     return json.dumps(values, indent=2) + "\n"

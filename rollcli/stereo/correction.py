@@ -4,23 +4,39 @@ import json
 import math
 from dataclasses import astuple, replace
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rollcli.errors import UsageError, as_usage, reading
 from rollcli.files.bounded import MOST_SETTINGS, read_given
 from rollcli.stereo.misalignment import ColumnSupport, Misalignment
 
 _VALUES = ("right_lower_px", "right_clockwise_deg", "right_larger_percent", "right_twist_px")
+_BEND = "right_bend_px"  # in the first and the last row; files of before it came have none
 _OFFSET_CI95 = "right_lower_ci95_px"
 _COLUMNS = ("scale", "twist", "pitch", "slope_error", "pitch_error")  # as of a `ColumnSupport`
 _EARLIER = {"pitch_error": 0.0}  # files of before it came have none
 _REACH = 1.96  # standard errors: of an interval of 95 %
-_LARGEST = (100.0, 45.0, 50.0, 100.0)  # of each; what is more is damage
+_LARGEST = (100.0, 45.0, 50.0, 100.0, 100.0)  # of each; what is more is damage
 
 
-def columns_as_text(columns: ColumnSupport) -> dict[str, float]:
-    """Return what `read_correction` reads of the columns."""
-    return {name: float(f"{value:.6g}") for name, value in zip(_COLUMNS, astuple(columns), strict=True)}
+class DriveRows(NamedTuple):
+    """What the rows of a drive's pairs say together, px of the size matched at.
+
+    Attributes
+    ----------
+    columns : ColumnSupport
+    curve : float
+        As in a `Misalignment`, 1/pixels.
+    """
+
+    columns: ColumnSupport
+    curve: float
+
+    def as_text(self, height: int, width: int) -> dict[str, Any]:
+        """Return what `read_correction` reads of it, for views of this size."""
+        bend = Misalignment(curve=self.curve).shifts(height, width)[5]
+        named = zip(_COLUMNS, astuple(self.columns), strict=True)
+        return {_BEND: round(bend, 6), "columns": {name: float(f"{value:.6g}") for name, value in named}}
 
 
 class Correction(NamedTuple):
@@ -70,6 +86,7 @@ def read_correction(path: str) -> Correction:
         with as_usage(), reading(f"--align {path}"):
             found = json.loads(read_given(path, MOST_SETTINGS))
         values = [float(found[name]) for name in _VALUES]
+        values.append(float(found.get(_BEND, 0.0)))
         width, height = int(found["width"]), int(found["height"])
         columns = None
         if found.get("columns") is not None:
@@ -83,4 +100,6 @@ def read_correction(path: str) -> Correction:
     fits &= columns is None or all(map(math.isfinite, astuple(columns)))
     if not (fits and offset_error >= 0 and width > 0 and height > 0):
         raise UsageError(f"--align {path}: holds numbers that no rig has")
-    return Correction(Misalignment.of_values(values, height, width), columns, offset_error, width)
+    curve = values.pop() / (height / 2) ** 2
+    lies = replace(Misalignment.of_values(values, height, width), curve=curve)
+    return Correction(lies, columns, offset_error, width)

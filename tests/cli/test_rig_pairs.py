@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.odd_views import seen_by
+from tests.odd_views import seen_by, seen_turned
 from tests.run_cli import rollcli, rows_of
 
 TRUTH = {"right_lower_px": 1.2, "right_clockwise_deg": 0.15, "right_larger_percent": 0.3}
@@ -98,6 +98,24 @@ def test_with_a_correction_the_angles_are_those_of_the_untouched_pairs(pairs):
     given = ("--align", "use.json", "-o", "corrected.csv", "-q")
     assert rollcli("estimate", "--left", "left", "--right", "off", *given, cwd=pairs).status == 0
     apart = np.abs(rolls(pairs / "corrected.csv") - rolls(pairs / "level.csv"))
+    assert np.median(apart) <= 0.02
+    assert apart.max() <= 0.08
+
+
+def test_a_drive_tells_a_pitch_from_a_shift_and_levels_its_rows(pairs):
+    """No pair alone tells 0.3 degrees of pitch from a view that is 1.8 px lower."""
+    (pairs / "pitched").mkdir()
+    for path in sorted((pairs / "right").iterdir()):
+        pitched = seen_turned(cv2.imread(str(path), cv2.IMREAD_UNCHANGED), pitch_deg=0.3)
+        cv2.imwrite(str(pairs / "pitched" / path.name), pitched)
+    given = ("--left", "left", "--right", "pitched", "-q")
+    assert rollcli("estimate", *given, "-o", "pitched.csv", cwd=pairs).status == 0
+    assert rollcli("rig", "pitched.csv", "--correction", "pitch.json", "-q", cwd=pairs).status == 0
+    assert rollcli("estimate", *given, "--align", "pitch.json", "-o", "unpitched.csv", cwd=pairs).status == 0
+
+    bend = json.loads((pairs / "pitch.json").read_text())["right_bend_px"]
+    assert bend == pytest.approx(-math.radians(0.3) / (0.7 * 480) * 180**2, rel=0.1)
+    apart = np.abs(rolls(pairs / "unpitched.csv") - rolls(pairs / "level.csv"))
     assert np.median(apart) <= 0.02
     assert apart.max() <= 0.08
 
