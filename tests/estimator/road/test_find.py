@@ -245,10 +245,10 @@ def test_a_real_street_that_is_rotated_moves_the_angle_as_much(name):
     start = estimate_roll(disparity).theta
 
     for turn_deg in (-6, -2, 3, 8):
-        found = estimate_roll(derotate(disparity, -math.radians(turn_deg)))
-        # of two planes that explain the map alike, which the message says, it may be the other's
-        as_well = "another plane" in found.message
-        assert as_well or math.degrees(found.theta - start) == pytest.approx(turn_deg, abs=0.15)
+        turned = derotate(disparity, -math.radians(turn_deg))
+        # another plane explains the second nearly as well: one seed of five finds that one, at 3 degrees
+        found = np.median([estimate_roll(turned, Request(seed=seed)).theta for seed in range(3)])
+        assert math.degrees(found - start) == pytest.approx(turn_deg, abs=0.15)
 
 
 @pytest.mark.parametrize("sentinel", [np.inf, np.finfo(np.float32).max, 1e20])
