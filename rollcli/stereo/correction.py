@@ -85,8 +85,7 @@ def read_correction(path: str) -> Correction:
     try:
         with as_usage(), reading(f"--align {path}"):
             found = json.loads(read_given(path, MOST_SETTINGS))
-        values = [float(found[name]) for name in _VALUES]
-        values.append(float(found.get(_BEND, 0.0)))
+        values, bend = [float(found[name]) for name in _VALUES], float(found.get(_BEND, 0.0))
         width, height = int(found["width"]), int(found["height"])
         columns = None
         if found.get("columns") is not None:
@@ -96,10 +95,12 @@ def read_correction(path: str) -> Correction:
         offset_error = math.inf if reach is None else float(reach) / _REACH
     except (ValueError, KeyError, TypeError, RecursionError, OverflowError) as error:
         raise UsageError(f"--align {path}: is no correction that `rollcli rig --correction` wrote") from error
-    fits = all(math.isfinite(each) and abs(each) <= most for each, most in zip(values, _LARGEST, strict=True))
+    fits = all(
+        math.isfinite(each) and abs(each) <= most
+        for each, most in zip([*values, bend], _LARGEST, strict=True)
+    )
     fits &= columns is None or all(map(math.isfinite, astuple(columns)))
     if not (fits and offset_error >= 0 and width > 0 and height > 0):
         raise UsageError(f"--align {path}: holds numbers that no rig has")
-    curve = values.pop() / (height / 2) ** 2
-    lies = replace(Misalignment.of_values(values, height, width), curve=curve)
+    lies = replace(Misalignment.of_values(values, height, width), curve=bend / (height / 2) ** 2)
     return Correction(lies, columns, offset_error, width)

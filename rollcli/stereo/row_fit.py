@@ -29,7 +29,8 @@ _SAME_SHARE = 0.02  # of what is found: the next round of measuring takes away m
 _TUNING = 1.5  # standard deviations off, a block counts a quarter
 _TILE = 64.0  # px of the size measured at: blocks within it err together
 _LINEAR = slice(4)  # offset, rotation, scale, twist
-_SURE = 4.0  # standard errors: a tilt of less is none. Plain roads cannot tell it from a scale
+# Standard errors: a tilt of less is none, and a curve no lens's. Plain roads cannot tell them from a scale
+_SURE = 4.0
 _FEWEST_TILES = 17  # of fewer, as of a first look, the sums tell no variance
 _EXACT = 1e-9  # px^2 times a weight: views without noise are known no better
 _FOCAL = 0.7  # widths: of most rigs
@@ -235,20 +236,18 @@ def fit_rows(seen: SeenBlocks, at: Misalignment = LEVEL, before: RowFit | None =
     likely = np.array([np.inf] * 4 + [BELIEF.tilt * frame.near, BELIEF.bend * frame.half_height])
     held, to = variance / np.square(likely), np.zeros(6)
     wide, curve = _least_squares(design, shift, fit.weight, held), at.curve * frame.units[5]
-    found = wide.values + np.array([0, 0, 0, 0, 0, curve])
+    sure = _SURE * np.sqrt(variance * np.diag(wide.inverse))
     many = np.count_nonzero(np.bincount(frame.tile)) >= _FEWEST_TILES
-    told = many & (np.square(found) > _SURE**2 * variance * np.diag(wide.inverse))
-    told[:5] |= np.array(at.parts[:5]) != 0
-    if not told[5]:  # no more than a pitch would have that is all of the offset
+    tilts = at.tilt != 0 or (many and abs(wide.values[4]) > sure[4])
+    if not (many and abs(wide.values[5] + curve) > sure[5]):
+        # no more than a pitch would have that is all of the offset
         rise = frame.half_height / (2 * _FOCAL * frame.half_width)
         held[5] = variance / max(_SAME, abs(at.offset + fit.values[0]) * rise**2) ** 2
         to[5] = -held[5] * curve
-        told[5] = many
-    used = np.append([True] * 4, told[4:])
-    if used[4:].any():
-        hold = held[used], to[used]
-        wider = _least_squares(design[used], shift, fit.weight, *hold)
-        fit = _settled(wider, design[used], shift, fixed, fit.spread, hold)
+    used = np.array([True] * 4 + [tilts, many])
+    if tilts or many:
+        few, hold = design[used], (held[used], to[used])
+        fit = _settled(_least_squares(few, shift, fit.weight, *hold), few, shift, fixed, fit.spread, *hold)
     errors = np.sqrt(np.square(fit.inverse @ (design[used] * fit.weight * fit.off)).sum(axis=1))
     parts = np.zeros((2, 6))
     parts[:, used] = (fit.values, errors)
@@ -476,12 +475,13 @@ def _settled(
     shift: Doubles,
     fixed: Doubles,
     spread: float,
-    hold: tuple[Doubles, Doubles] | tuple[()] = (),
+    held: Doubles | float = 0.0,
+    to: Doubles | float = 0.0,
 ) -> _Fit:
     """Go on from a fit, each block weighed by how far off it was, until its values stay; `spread` is held."""
     for _ in range(_FIT_ROUNDS):
         values = fit.values
-        fit = _least_squares(design, shift, fixed * _believed(fit.off, spread), *hold)
+        fit = _least_squares(design, shift, fixed * _believed(fit.off, spread), held, to)
         if np.abs(fit.values - values).max() < max(_SAME, _SAME_SHARE * np.abs(fit.values).max()):
             break
     return fit._replace(spread=spread)
