@@ -681,7 +681,7 @@ class RigOptions:
     correction : str or None
         Also write how the right view of the pairs has to be corrected: JSON with the numbers, a 3x3
         matrix and the OpenCV call, for `estimate --align FILE`. Up to 24 of the pairs are matched again,
-        to tell what of a scale is in the columns.
+        to tell how their rows bend, and what of a scale is in the columns.
     calibration : CalibrationOptions
         For what a misalignment does to depth.
     gates : GateOptions
