@@ -247,7 +247,8 @@ class _Profile:
         place = (share[near] * (_BINS / (1 + _OVER))).astype(np.uint16)
         middles = bottom * _FAR ** ((np.arange(_BINS) + 0.5) * ((1 + _OVER) / _BINS) - 1)
         scaled = np.maximum(1, bottom / (2 * middles)) * middles / self.rise
-        design, weights = _profile_basis(middles / bottom), np.zeros(_BINS)
+        design = _profile_basis(middles / bottom)
+        weights: Floats = np.zeros(_BINS)
         fitted, left = np.zeros(4), gap
         for tolerance in _TOLERANCES:
             close = np.abs(left) < (tolerance * scaled)[place]

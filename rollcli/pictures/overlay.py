@@ -202,7 +202,7 @@ def draw_heights(
         picture[~known] = _NO_DATA
     else:
         height, width = heights.shape
-        grey = cv2.cvtColor(as_bgr(photo, (width, height)), cv2.COLOR_BGR2GRAY)
+        grey = cv2.cvtColor(as_bgr(photo, (width, height)), cv2.COLOR_BGR2GRAY).astype(np.uint8, copy=False)
         white = max(float(np.percentile(grey, _BRIGHT)), 1.0)
         light = np.minimum(grey * np.float32((1 - _DARKEST) / white) + np.float32(_DARKEST), 1)
         picture = (picture * light[..., None]).astype(np.uint8)

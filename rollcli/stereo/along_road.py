@@ -90,7 +90,8 @@ class Levelled:
     @property
     def shape(self) -> tuple[int, int]:
         """Height and width."""
-        return self.views[0].shape
+        height, width = self.views[0].shape
+        return height, width
 
     @cached_property
     def _near(self) -> Map | None:

@@ -43,7 +43,7 @@ def without_lag(disparity: NDArray[np.float32], mode: str) -> NDArray[np.float32
     lags = (most * up / (up + half_at)).astype(np.float32) * known
     around = cv2.blur(known, (_AROUND, _AROUND))
     filled = np.where(known > 0, lags, cv2.blur(lags, (_AROUND, _AROUND)) / np.maximum(around, 1e-3))
-    added = cv2.resize(filled, (width, height), interpolation=cv2.INTER_LINEAR)
+    added = cv2.resize(filled, (width, height), interpolation=cv2.INTER_LINEAR).astype(np.float32, copy=False)
     added *= disparity > 0
     corrected: NDArray[np.float32] = np.add(disparity, added, out=added)
     return corrected

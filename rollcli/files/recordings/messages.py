@@ -242,7 +242,7 @@ def _pixels(image: Any, name: str) -> NDArray[Any]:
     if needed > min(data.size, MOST_BYTES):
         raise InputError(f"{name}: is truncated: {needed} bytes are needed, {data.size} are there")
     require_decoded_fits(width, height, channels * dtype.itemsize, data.size, name)
-    values = np.ndarray((height, width * channels), dtype, data, strides=(step, dtype.itemsize))
+    values: NDArray[Any] = np.ndarray((height, width * channels), dtype, data, strides=(step, dtype.itemsize))
     values = values.astype(dtype.newbyteorder("="), copy=False)
     values = np.ascontiguousarray(values)  # of any alignment: a message lies anywhere in its chunk
     if channels > 1:
@@ -276,9 +276,11 @@ def _rectified(values: NDArray[Any], info: CameraInfo, name: str) -> NDArray[Any
 def _rectification(info: CameraInfo) -> tuple[NDArray[Any], NDArray[Any]]:
     size = (info.width, info.height)
     k, r, p = (np.array(each).reshape(3, -1) for each in (info.k, info.r, info.p))
-    r = r if r.any() else np.eye(3)
+    turned = r if r.any() else np.eye(3)
     if info.model in _FISHEYE:
-        found = cv2.fisheye.initUndistortRectifyMap(k, np.array(info.d[:4]), r, p[:, :3], size, cv2.CV_32FC1)
+        found = cv2.fisheye.initUndistortRectifyMap(
+            k, np.array(info.d[:4]), turned, p[:, :3], size, cv2.CV_32FC1
+        )
     else:
-        found = cv2.initUndistortRectifyMap(k, np.array(info.d), r, p[:, :3], size, cv2.CV_32FC1)
+        found = cv2.initUndistortRectifyMap(k, np.array(info.d), turned, p[:, :3], size, cv2.CV_32FC1)
     return found[0], found[1]
