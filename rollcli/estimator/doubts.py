@@ -12,6 +12,7 @@ from rollcli.estimator.interval import Interval
 from rollcli.estimator.moments import CheckedMap
 from rollcli.estimator.request import Request
 from rollcli.estimator.road.pixels import PixelSet
+from rollcli.estimator.road.sample import quantile
 from rollcli.estimator.road.surface import Surface
 from rollcli.estimator.solvers.exact import CertifiedSolution
 from rollcli.estimator.solvers.solution import angle_between
@@ -23,6 +24,7 @@ _ON_ROAD = 0.03  # of the road's disparity, within which a pixel is on it
 _BELOW = 0.15  # of the road's disparity, by which a pixel is below it
 _FEW = 8  # pixels of the lane in a band: fewer tell nothing
 _ENOUGH = 0.1  # of the pixels ahead that have data: fewer tell nothing
+_NEAREST = 0.95  # of the road's pixels that lie farther away than where it is seen nearest, outliers aside
 _AT_BOUND = 0.99  # of the largest roll: a search ends a little before it
 
 
@@ -130,8 +132,10 @@ def _doubts_of_plane(
     if (lower[some] > tuning.most_below * in_lane[some]).any():
         yield "the plane ends near ahead, as a table does: what is seen there lies below it"
     ground = road > 0 if checked.usable is None else (road > 0) & checked.usable[::step, ::step]
-    farther = ground & (near < 0.5)  # more than twice as far away as at the lower border
-    few = on_road[farther].sum() < tuning.least_farther * max(1, on_road[ground].sum())
+    shown = near[ground & on_road]
+    begin = quantile(shown, _NEAREST) if shown.size else 1.0  # a dashboard's front hides what is nearer
+    farther = ground & (near < begin / 2)  # more than twice as far away
+    few = on_road[farther].sum() < tuning.least_farther * max(1, shown.size)
     if few and farther.sum() > _ENOUGH * ground.sum():
         yield "the plane is seen near ahead alone, as a dashboard is"
     begins = max(at_reach, 2 * farthest / nearest)

@@ -178,9 +178,9 @@ class DoubtTuning:
         ones, 0.07 behind a truck. Without it 47 scenes are ok: shelves, desks, rooms; with 0.15 21
         of 3600 are in place of 17.
     least_farther : float
-        Share of the road's pixels that lie more than twice as far away as it is at the lower border:
-        0.11 and more on real roads and rendered ones, 0.09 on crops of real maps; of dashboards mostly 0.
-        Without it 34 of 180 scenes inside a car are ok in place of 3 (bench_roadless.py).
+        Share of the road's pixels that lie more than twice as far away as the nearest of them: 0.09 and more
+        on real roads and rendered ones, 0.05 on crops of lidar sweeps; of dashboards mostly 0. Without it 39
+        of 200 scenes inside a car are ok in place of 2 (bench_roadless.py).
     rival_share : float
         Share of the road's score from which another plane explains the map nearly as well.
     longest_move : float

@@ -60,8 +60,8 @@ def close_table():
 
 
 def dashboard():
-    """A car's dashboard, and through the window above it nothing."""
-    return with_noise(np.where(V > 380, road(4), 0))
+    """A car's dashboard and its front, which is steep, and through the window above them nothing."""
+    return with_noise(np.where(V > 420, 80, np.where(V > 300, road(4), 0)))
 
 
 def table(roll_deg):
