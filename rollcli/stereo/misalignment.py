@@ -174,5 +174,5 @@ def advice_of(lower: float, clockwise: float, larger: float, twist: float) -> st
     if abs(larger) >= 0.1:
         parts.append(f"the right image is {abs(larger):.2f} % {'larger' if larger > 0 else 'smaller'}")
     if abs(twist) >= 0.5:
-        parts.append(f"its rows are skewed by {abs(twist):.1f} px in the corners")
+        parts.append(f"the right image's rows are skewed by {abs(twist):.1f} px in the corners")
     return ", ".join(parts) + ": recalibrate" if parts else ""

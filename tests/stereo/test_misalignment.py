@@ -107,7 +107,7 @@ def test_every_part_has_its_advice():
         "clockwise seen from behind",
         "the right image lies 0.60 px lower",
         "the right image is 0.30 % larger",
-        "its rows are skewed by 1.5 px in the corners: recalibrate",
+        "the right image's rows are skewed by 1.5 px in the corners: recalibrate",
     ]
 
 
