@@ -1,6 +1,7 @@
 """The `rollcli` group: it imports a command when it is called, and ends every error as one line."""
 
 import contextlib
+import errno
 import os
 import sys
 from collections.abc import Callable, Iterator
@@ -11,7 +12,7 @@ from typing import Any
 import click
 
 from rollcli import __version__
-from rollcli.errors import ExitStatus, InputError, RollcliError, UsageError
+from rollcli.errors import ExitStatus, InputError, RollcliError, UsageError, output_error
 from rollcli.messages import one_line, say
 
 # name -> (module, one-line help): `rollcli --help` needs no command's module
@@ -122,7 +123,7 @@ def _from_environment(error: click.ClickException) -> str:
 
 @contextlib.contextmanager
 def _ended_by_its_reader() -> Iterator[None]:
-    """End quietly where the reader of stdout has left, which click would call a failure."""
+    """End quietly where the reader of stdout has left, which click would call a failure; say a full disk."""
     try:
         yield
     except BrokenPipeError:
@@ -130,6 +131,10 @@ def _ended_by_its_reader() -> Iterator[None]:
         os.dup2(nowhere, 1)  # the interpreter flushes the rest
         os.close(nowhere)
         raise click.exceptions.Exit(ExitStatus.DONE) from None
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            raise
+        raise output_error(error.filename or "standard output", error) from None
 
 
 _OPENCV = tuple(f"opencv-{name}python{kind}" for name in ("", "contrib-") for kind in ("-headless", ""))

@@ -69,6 +69,16 @@ def test_a_reader_of_answers_who_has_left_ends_the_program_quietly(maps, argumen
     assert (run.returncode, err) == (0, b"")
 
 
+@NO_DISK
+@pytest.mark.parametrize("arguments", [[], ["--version"], ["rig", "--help"]])
+def test_an_answer_that_meets_a_full_disk_is_told_in_words(maps, arguments):
+    with Path("/dev/full").open("wb") as full:
+        run = start(maps, arguments, stdout=full, stderr=subprocess.PIPE)
+        _, err = run.communicate(timeout=60)
+    said = b"rollcli: standard output: cannot be written: no space left on device\n"
+    assert (run.returncode, err) == (1, said)
+
+
 def test_an_error_keeps_its_status_when_nobody_reads_its_message(maps):
     assert start_without_reader(maps, ["estimate", "nothing"], "stderr").wait(60) == 2
 
