@@ -169,8 +169,8 @@ def test_an_image_that_was_not_read_is_said():
         lambda each: rollcli.derotate(each, 0.1),
         lambda each: rollcli.height_map(each, estimate),
     ):
-        for wrong in (None, [[1, 2], [3]], "map.png"):
-            with pytest.raises(rollcli.UsageError, match=r"map"):
+        for wrong in (None, [[1, 2], [3]], "map.png", np.ones((360, 480), complex)):
+            with pytest.raises(rollcli.UsageError, match=r"map.* (real|None)"):
                 call(wrong)
 
 
@@ -210,6 +210,9 @@ def test_what_a_masked_array_hides_is_no_data(disparity):
     assert np.array_equal(rollcli.derotate(masked, 0.1), rollcli.derotate(cut, 0.1))
     heights, same = (rollcli.height_map(each, estimate) for each in (masked, cut))
     assert np.array_equal(heights, same, equal_nan=True)
+    regions = np.ma.MaskedArray(np.ones(disparity.shape), hidden), ~hidden
+    of_masked, of_mask = (rollcli.estimate_roll(disparity, mask=each).to_dict() for each in regions)
+    assert of_masked == of_mask
 
 
 def test_an_estimate_is_json_and_its_columns_are_those_of_the_command(tmp_path):
@@ -238,6 +241,9 @@ def test_a_depth_map_is_told_as_the_command_tells_it(disparity):
     assert found.status == "suspect"
     assert found.message.startswith("looks like a depth map: give focal length times baseline")
     assert "--" not in found.message
+    stored = rollcli.estimate_roll(disparity * 256, calibration=CALIB)
+    assert stored.status == "suspect"
+    assert stored.message.endswith("the numbers look 256 times too large; give the numbers / 256")
 
 
 def test_a_photograph_is_told_as_the_command_tells_it():

@@ -94,7 +94,7 @@ def map_of(disparity: ArrayLike | None) -> NDArray[Any]:
 
 
 def usable_of(mask: ArrayLike) -> NDArray[np.bool_]:
-    """Return which pixels a mask lets be used, shape (H, W): neither 0 nor NaN.
+    """Return which pixels a mask lets be used, shape (H, W): neither 0 nor NaN nor hidden.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def usable_of(mask: ArrayLike) -> NDArray[np.bool_]:
         It is no 2-D array of numbers.
     """
     try:
-        values = np.asarray(mask)
+        values = np.asarray(mask.filled(0) if isinstance(mask, np.ma.MaskedArray) else mask)
         usable: NDArray[np.bool_] = (values > 0) | (values < 0)
     except (TypeError, ValueError) as error:
         raise UsageError(f"a mask is a 2-D array of numbers: {error}") from error

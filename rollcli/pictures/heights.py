@@ -169,8 +169,8 @@ def heights_over(disparity: NDArray[Any], road: FittedRoad, calibration: Calibra
     if disparity.shape != (road.height, road.width) or disparity.dtype.kind not in "fiu":
         size = "x".join(map(str, disparity.shape[::-1]))
         raise UsageError(
-            f"a {disparity.dtype} map of {size} px is not one of the {road.width}x{road.height} px that "
-            "its road was fitted to"
+            f"{size} px of {disparity.dtype} are no map of real numbers of {road.width}x{road.height} px, "
+            "as the road was fitted to"
         )
     if calibration is not None:
         calibration = calibration.for_size(road.width, road.height)

@@ -26,19 +26,25 @@ _DIVISORS = (("sgbm", 16), ("kitti", 256))
 
 
 class Remedies(NamedTuple):
-    """What to do about a depth map and a photograph, in the words of who is told."""
+    """What to do about what is no map in pixels, in the words of who is told."""
 
     depth: str
     photograph: str
+    encoding: str
+    scale: str
 
 
 COMMAND = Remedies(
     depth="give --encoding depth and its calibration, such as --calib FILE",
     photograph="give photographs by --left and --right",
+    encoding="--encoding {name} (stored / {by})",
+    scale="--scale, the pixels that a stored number of 1 stands for",
 )
 PYTHON = Remedies(
     depth="give focal length times baseline, over the depth",
     photograph="give both views to rollcli.estimate_pair",
+    encoding="the numbers / {by}",
+    scale="pixels",
 )
 _UPSIDE_DOWN = "upside down: reverse the order of its rows"
 
@@ -107,7 +113,7 @@ def require_positive(stored: Stored, name: str) -> None:
         )
 
 
-def too_large(disparity: NDArray[Any], stored: Stored, encoding: str) -> str:
+def too_large(disparity: NDArray[Any], stored: Stored, encoding: str, remedies: Remedies = COMMAND) -> str:
     """Say that the disparities cannot be pixels, and what would divide them; empty when they can.
 
     Parameters
@@ -118,6 +124,8 @@ def too_large(disparity: NDArray[Any], stored: Stored, encoding: str) -> str:
         What the file holds.
     encoding : str
         How it was read.
+    remedies : Remedies
+        `COMMAND` or `PYTHON`.
     """
     width = disparity.shape[1]
     if not disparity.max() > width:
@@ -138,9 +146,9 @@ def too_large(disparity: NDArray[Any], stored: Stored, encoding: str) -> str:
         (name, by) for name, by in _DIVISORS if name != encoding and near / by <= TUNING.plausible * width
     ]
     if not fitting:
-        return f"{said}: give --scale, the pixels that a stored number of 1 stands for"
+        return f"{said}: give {remedies.scale}"
     times = " or ".join(str(by) for _, by in fitting)
-    remedy = " or ".join(f"--encoding {name} (stored / {by})" for name, by in fitting)
+    remedy = " or ".join(remedies.encoding.format(name=name, by=by) for name, by in fitting)
     return f"{said}: the numbers look {times} times too large; give {remedy}"
 
 

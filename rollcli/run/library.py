@@ -21,7 +21,7 @@ from rollcli.files.formats import Stored, read_image, read_stored
 from rollcli.files.naming import Input
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import with_pose
-from rollcli.run.diagnosis import PYTHON, estimate_or_liken, looks_like
+from rollcli.run.diagnosis import PYTHON, estimate_or_liken, looks_like, too_large
 from rollcli.run.find import given_calibration
 from rollcli.run.options import FrameOptions, MethodOptions
 from rollcli.run.read import matched_source, road_finder
@@ -118,17 +118,24 @@ def estimate_roll(
         request = replace(request, middle=rig.for_size(*values.shape[::-1]).cx)
     like = partial(_likeness, values, seed)
     estimate, likeness = estimate_or_liken(values, request, like, mask=mask, road_mask=road_mask)
-    estimate = replace(estimate, message="; ".join(filter(None, [likeness, estimate.message])))
+    # the roll is the same at any scale, pitch and height are not
+    beyond = "" if rig is None else too_large(*_in_pixels(values), "px", PYTHON)
+    message = "; ".join(filter(None, [likeness, estimate.message, beyond]))
+    estimate = replace(estimate, status="suspect" if beyond else estimate.status, message=message)
     return estimate if rig is None else with_pose(estimate, rig)
+
+
+def _in_pixels(values: NDArray[Any]) -> tuple[NDArray[Any], Stored]:
+    """Return an array as a file of it would be read, pixels with 0 for no data, and as it is."""
+    stored = Stored(values, "npy")
+    return to_disparity(stored, encoding="px").disparity, stored
 
 
 def _likeness(values: NDArray[Any], seed: int) -> str:
     """Say what an array without a sure angle looks like instead of a map; empty when like nothing known."""
     if values.dtype.kind not in "fiu" or not values.size:
         return ""
-    stored = Stored(values, "npy")
-    disparity = to_disparity(stored, encoding="px").disparity
-    return looks_like(disparity, stored, FrameOptions(method=MethodOptions(seed=seed)), PYTHON)
+    return looks_like(*_in_pixels(values), FrameOptions(method=MethodOptions(seed=seed)), PYTHON)
 
 
 def estimate_pair(
