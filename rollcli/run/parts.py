@@ -131,7 +131,7 @@ def _begin(plan: Plan) -> PartsOutput:
     # again, now that no other run can write it
     parts = check_parts(plan)
     kept, renewed = _kept(plan, parts)
-    record = new_record(plan, kept)
+    record = new_record(plan, kept, parts)
     _remove_leftovers(plan, parts)
     rows = plan.options.result.part_rows
     whole = set(range(_whole_parts(kept.count, rows))).difference(at // rows for at in kept.holes)

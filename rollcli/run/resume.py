@@ -476,10 +476,11 @@ class Output:
         self._new_notes.clear()
 
 
-def new_record(plan: Plan, kept: KeptRows) -> RunRecord:
+def new_record(plan: Plan, kept: KeptRows, parts: Sequence[str] = ()) -> RunRecord:
     """Make the record of a run, which continues that of an interrupted run where rows are kept.
 
-    What killed workers left beside the images is removed.
+    What killed workers left beside the images is removed. Of a run with larger parts none of the `parts` that
+    are there is kept, and yet they hold rows.
 
     Raises
     ------
@@ -493,7 +494,7 @@ def new_record(plan: Plan, kept: KeptRows) -> RunRecord:
             found = next(_differences(kept, earlier, record), "")
         except InputError as error:
             found = str(error)
-        if found and kept.count:
+        if found and (kept.count or parts):
             raise not_resumable(plan.output, found)
         if found:  # what is there is of another run
             outputs.check_nothing_is_there(outputs.files_of(plan.frames, options.writes))
