@@ -22,7 +22,7 @@ from rollcli.run.frame import Frame
 from rollcli.run.plan import Plan
 from rollcli.run.progress import RunSummary
 from rollcli.run.result_file import Inputs, inputs_path, is_part_inputs, part_inputs_path, split_lines
-from rollcli.run.resume import KeptRows, Output, RunRecord, new_record
+from rollcli.run.resume import KeptRows, Output, RunRecord, checked_record, new_record
 
 _CHECK_S = 10.0  # a request of 50 ms now and then
 
@@ -181,7 +181,10 @@ def check_parts(plan: Plan) -> list[str]:
 
 def kept_in_parts(plan: Plan) -> KeptRows:
     """Take in the rows that a resume would keep."""
-    return _kept(plan, check_parts(plan))[0]
+    parts = check_parts(plan)
+    kept, _ = _kept(plan, parts)
+    checked_record(plan, kept, parts)
+    return kept
 
 
 def _kept(plan: Plan, parts: list[str]) -> tuple[KeptRows, dict[str, bytes]]:

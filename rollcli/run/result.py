@@ -29,7 +29,15 @@ from rollcli.run.result_file import (
     open_result,
     row_lines,
 )
-from rollcli.run.resume import KeptRows, Output, RunRecord, arranged, is_replaceable_record, new_record
+from rollcli.run.resume import (
+    KeptRows,
+    Output,
+    RunRecord,
+    arranged,
+    checked_record,
+    is_replaceable_record,
+    new_record,
+)
 
 
 class StreamOutput(Output):
@@ -155,7 +163,9 @@ def kept_of(plan: Plan) -> KeptRows:
     if plan.in_parts:
         return kept_in_parts(plan)
     _check_permitted(plan)
-    return _parsed(data_of(plan.output) if plan.options.result.resume else b"", plan)[0]
+    kept, *_ = _parsed(data_of(plan.output) if plan.options.result.resume else b"", plan)
+    checked_record(plan, kept)
+    return kept
 
 
 def _parsed(data: bytes, plan: Plan) -> tuple[KeptRows, bytes, bytes]:

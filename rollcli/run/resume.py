@@ -487,6 +487,14 @@ def new_record(plan: Plan, kept: KeptRows, parts: Sequence[str] = ()) -> RunReco
     UsageError
         It cannot be continued; says what differs. Or it is a first start, and there are images already.
     """
+    record, options = checked_record(plan, kept, parts), plan.options
+    if options.result.resume or options.running.overwrite:
+        remove_leftovers(outputs.files_of(kept.not_failed(), options.writes))
+    return record
+
+
+def checked_record(plan: Plan, kept: KeptRows, parts: Sequence[str] = ()) -> RunRecord:
+    """Make that record, and change nothing; see `new_record`."""
     record, options = RunRecord(plan), plan.options
     if options.result.resume:
         try:
@@ -500,8 +508,6 @@ def new_record(plan: Plan, kept: KeptRows, parts: Sequence[str] = ()) -> RunReco
             outputs.check_nothing_is_there(outputs.files_of(plan.frames, options.writes))
         elif earlier is not None:
             record.continue_from(earlier)
-    if options.result.resume or options.running.overwrite:
-        remove_leftovers(outputs.files_of(kept.not_failed(), options.writes))
     return record
 
 
