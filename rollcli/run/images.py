@@ -14,7 +14,7 @@ from rollcli.estimator.estimate import RollEstimate, estimate_roll
 from rollcli.files.codecs.png import encode_png
 from rollcli.files.codecs.tiff import encode_tiff
 from rollcli.files.encodings import KITTI_TOP, Encoding, to_kitti
-from rollcli.files.formats import Stored, encode_stored
+from rollcli.files.formats import encode_stored
 from rollcli.files.results import Row
 from rollcli.pictures.derotate import derotate, rotation_matrix
 from rollcli.pictures.heights import FittedRoad, heights_over, steadied, unit_of
@@ -64,8 +64,9 @@ class Pictured:
         """Turn the map upright."""
         source, theta = self.source, self.estimate.theta
         if source.stored is None:
-            return encode_computed(path, derotate(source.shown, theta), self.options.images.save_as)
-        return path, encode_turned(source.stored, theta, source.encoding, self.options.encoding)
+            turned = derotate(source.shown, theta)
+            return encode_computed(path, turned, self.options.images.save_as, source.text)
+        return path, encode_turned(source, theta, self.options.encoding)
 
     def vdisparity(self, path: str) -> _Named:
         """Draw the v-disparity image of the map turned upright."""
@@ -119,19 +120,20 @@ def _usual_paths(frame: Frame, options: FrameOptions) -> dict[str, str]:
     return {kind: options.at(usual) for kind, (usual, *_) in possible_paths(frame, options.writes)}
 
 
-def encode_turned(
-    stored: Stored, roll: float, encoding: str, given: EncodingOptions, *, expand: bool = False
-) -> bytes:
+def encode_turned(source: Source, roll: float, given: EncodingOptions, *, expand: bool = False) -> bytes:
     """Rotate a map by `roll` radians, and encode it in its own type, encoding and format."""
+    stored = source.stored
+    assert stored is not None  # a map, not a pair
     sign = -1 if given.scale is not None and given.scale < 0 else 1
     no_data = [sign * each for each in (*given.invalid, *stored.nodata)]
-    if encoding == Encoding.CITYSCAPES:
+    if source.encoding == Encoding.CITYSCAPES:
         no_data.append(1)  # (1 - 1) / 256 is a disparity of 0
     values = stored.values
     if sign < 0:  # positive numbers are data to the rotation; whole ones get room for their lowest
         values = -(values if values.dtype.kind == "f" else values.astype(np.int64))
     turned = sign * derotate(values, roll, expand=expand, invalid=no_data)
-    return encode_stored(turned.astype(stored.values.dtype, copy=False), stored.format, stored.nodata)
+    turned = turned.astype(stored.values.dtype, copy=False)
+    return encode_stored(turned, stored.format, stored.nodata, source.text)
 
 
 def encode_computed(path: str, disparity: NDArray[Any], save_as: str, text: str = "") -> tuple[str, bytes]:
@@ -178,9 +180,8 @@ def converted(frame: Frame, source: Source, options: FrameOptions) -> Made:
 
 def _rotated(source: Source, of: Frame, options: DerotateOptions, paths: Mapping[str, str]) -> _Files:
     """Turn the map, and say where pixels go."""
-    assert source.stored is not None  # a map, not a pair
     roll = math.radians((options.roll_deg if of.row is None else of.row.map_roll_deg) or 0.0)
-    turned = encode_turned(source.stored, roll, source.encoding, options.encoding, expand=options.expand)
+    turned = encode_turned(source, roll, options.encoding, expand=options.expand)
     files = {paths["derotated"]: turned}
     if options.save_matrix:
         files[paths["matrix"]] = _matrix_text(source.disparity.shape, roll, options.expand)

@@ -136,9 +136,11 @@ class Source:
     @property
     def text(self) -> str:
         """What a file of the map carries, one line of ASCII (see `_carried`); empty where that is nothing."""
-        if not (self.slope_error or self.doubt or self.alignment):
+        # that numbers are too large to be pixels, whoever reads the file sees
+        doubt = "; ".join(text for code, text in self.doubts.items() if text and code != "beyond")
+        if not (self.slope_error or doubt or self.alignment):
             return ""
-        return json.dumps({"slope_error": self.slope_error, "doubt": self.doubt, "alignment": self.alignment})
+        return json.dumps({"slope_error": self.slope_error, "doubt": doubt, "alignment": self.alignment})
 
     def calibrated(self, calibration: Calibration | None) -> Calibration | None:
         """Scale a calibration of the images in the files to the map; none stays none.

@@ -60,6 +60,20 @@ def test_a_pair_and_its_map_give_the_same_row(pair, form):
         assert float(of_map[column]) == pytest.approx(float(of_pair[column]), abs=0.01)
 
 
+def test_a_map_that_is_turned_upright_keeps_what_levelling_left_open(pair):
+    folder, _, _ = pair
+    views = ("--left", "left", "--right", "right")
+    of_pair = row_of(folder, *views, "--derotated", "upright")
+    assert rollcli("disparity", *views, "-o", "maps", cwd=folder).status == 0
+    assert rollcli("derotate", "maps", "--roll", of_pair["roll_deg"], "-o", "turned", cwd=folder).status == 0
+
+    for turned in ("upright", "turned"):
+        row = row_of(folder, turned)
+        assert float(row["roll_deg"]) == pytest.approx(0, abs=0.02)
+        assert float(row["roll_ci95_deg"]) == pytest.approx(float(of_pair["roll_ci95_deg"]), abs=0.01)
+        assert [row[name] for name in ALIGNMENT_COLUMNS] == [of_pair[name] for name in ALIGNMENT_COLUMNS]
+
+
 def test_the_call_says_what_the_command_does(pair):
     folder, left, right = pair
     row = row_of(folder, "--left", "left", "--right", "right")
