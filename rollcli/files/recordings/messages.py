@@ -66,6 +66,11 @@ class CameraInfo:
         return all(map(math.isfinite, self.p)) and self.p[0] > 0 and self.p[5] > 0
 
     @property
+    def across(self) -> float:
+        """How far the origin of P, which may be a third camera, stands to the right of this one, m."""
+        return (self.p[3] - self.p[2] * self.p[11]) / self.p[0]
+
+    @property
     def changes_raw_views(self) -> bool:
         """Whether a raw view is not the rectified one."""
         upright = all(
