@@ -81,3 +81,5 @@ def test_the_axis_stays_that_of_frames_where_time_would_mislead():
     ):
         chart = all_charts(some, assess_rig(some))["roll"]
         assert chart.layout["xaxis"]["title"]["text"] == "frame"
+    mixed = assess_rig([*given[:50][::-1], *given[50:]])
+    assert mixed.drift_per_hour(mixed.drives[0]).value is None

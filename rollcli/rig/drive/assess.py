@@ -212,13 +212,13 @@ class RigAssessment:
         return seconds_of(self.frames.files)
 
     def drift_per_hour(self, drive: DriveAssessment | None, quantity: Quantity = ROLL) -> Estimate:
-        """Return the drift of a drive over the time between its ends; unknown where names have no stamps."""
+        """Return the drift of a drive over its time; unknown where names have no stamps that ascend."""
         found = None if drive is None else drive.quantities.get(quantity.name)
         seconds = self.seconds[drive.frames] if drive is not None else np.empty(0)
-        known = seconds[np.isfinite(seconds)]  # none where names have no stamps
-        if found is None or found.drift.value is None or len(known) < 2 or known[-1] <= known[0]:
+        steps = np.diff(seconds[np.isfinite(seconds)])  # none where names have no stamps
+        if found is None or found.drift.value is None or not steps.any() or steps.min() < 0:
             return Estimate()
-        hours = float(known[-1] - known[0]) / 3600
+        hours = float(steps.sum()) / 3600
         half = found.drift.ci95
         return Estimate(found.drift.value / hours, None if half is None else half / hours)
 
