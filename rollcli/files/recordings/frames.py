@@ -135,7 +135,7 @@ def pairs_of_bag(files: Sequence[str], name: str, left: str, right: str, toleran
     one, other = (found.cameras.get(_beside(topic)) for topic in (left, right))
     bag.calibration = _calibration(one, other, 0.0, f"CameraInfo of {name}")
     if bag.calibration is None and found.cameras:
-        bag.notes.append(f"{name}: {_NO_P}")
+        bag.notes.append(f"{name}: {_beside(left)} is {_NO_P}")
     _finish(bag, found, name, f"{left} and {right}")
     return bag
 
