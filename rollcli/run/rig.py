@@ -121,7 +121,8 @@ def _check_shards(parts: Sequence[Part], shards: Sequence[tuple[int, int]]) -> N
                 f"{first.path} and {(part if part is not first else parts[1]).path} are not shards of one "
                 "run: name all shards of one run, or results of whole runs"
             )
-        for name, was, now in _different(first, part):
+        for name, *values in _different(first, part):
+            was, now = ("not given" if each is None else each for each in values)
             names = f"{first.path} and {part.path}"
             raise UsageError(f"{names} are not shards of one run: {name} was {was} and {now}")
     indices = [index for index, _ in shards]
