@@ -145,10 +145,12 @@ def _of_one(
 
 
 def too_few(found: SequenceAssessment, quantity: Quantity = ROLL) -> str:
-    """Return why a quantity has no interval, and how far the frames spread."""
+    """Return why a quantity has no interval, or no jumps, and how far the frames spread."""
     if not found.used:
         return "no frame counts"
     if found.used == 1:
         return "a single frame"
     spread = f"{np.ptp(found.series.values[found.series.used]):.2f}{quantity.unit}"
-    return f"{found.used:,} frames, which spread over {spread}; an interval takes {TUNING.fewest}"
+    none = found.now.ci95 is None
+    takes = f"an interval takes {TUNING.fewest}" if none else f"a jump takes {2 * TUNING.fewest}"
+    return f"{found.used:,} frames, which spread over {spread}; {takes}"

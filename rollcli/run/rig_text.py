@@ -202,9 +202,10 @@ def _lines(found: Findings) -> Iterator[str]:
         found_roll, over = drive.quantities[ROLL.name], rig.name_of(drive) if len(rig.drives) > 1 else ""
         if found_roll.drift.ci95 is not None:
             drifts = drift_in_words(rig, drive, over=over or "the drive")
-            yield f"drift   {drifts}" + ("" if found_roll.drifts else ": none is seen")
+            none = found_roll.searched and not found_roll.drifts
+            yield f"drift   {drifts}" + (": none is seen" if none else "")
         # none only where every drive has frames enough to tell
-        told = all(drive.quantities[ROLL.name].now.ci95 is not None for drive in rig.drives)
+        told = all(drive.quantities[ROLL.name].searched for drive in rig.drives)
         yield f"jumps   {len(jumps) or ('none' if told else 'too few frames to tell')}"
     yield from (f"        {line}" for line in jumps)
     yield from _segment_lines(rig)

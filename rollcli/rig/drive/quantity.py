@@ -97,6 +97,11 @@ class SequenceAssessment:
         return self.segments[-1].end if self.segments else Estimate()
 
     @property
+    def searched(self) -> bool:
+        """Whether there are frames enough to look for jumps and a drift: those of two stretches."""
+        return self.used >= 2 * TUNING.fewest
+
+    @property
     def starts(self) -> list[int]:
         """The first frame of each segment but the first."""
         return [each.frame for each in self.jumps]
