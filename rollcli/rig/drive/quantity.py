@@ -272,8 +272,9 @@ def gross_outliers(values: Floats, variances: Floats) -> Flags:
     """
     residuals = _off_neighbours(values)
     standardised = residuals / np.sqrt(variances + _wander(residuals, variances))
-    # most frames of a rig that stands still may be alike: then their own errors are the scale
-    scale = _MAD_TO_SD * float(np.median(standardised)) or 1.0 if len(values) else 0.0
+    scale = _MAD_TO_SD * float(np.median(standardised)) if len(values) else 0.0
+    if not scale and len(values) >= TUNING.fewest:  # most frames are alike, as of a rig that stands still
+        scale = 1.0  # that of their own errors
     if not scale > 0 or not math.isfinite(scale):
         return np.zeros(len(values), dtype=bool)
     return np.asarray(standardised > TUNING.gross * scale)
