@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rollcli.estimator.moments import Floats, Grid, powers, solve_normal
 from rollcli.estimator.road.model import Parabola, Reals, RoadModel
+from rollcli.estimator.road.sample import quantile
 from rollcli.estimator.road.surface import Surface
 from rollcli.estimator.tuning import IntervalTuning
 
@@ -41,8 +42,8 @@ class Jackknife:
         How far the road's patches lie over or under its parabola, root mean square, over the width of the
         view where it is nearest: an angle, radians.
     hidden : float
-        By how much wider the view is where the road is nearest than at the map's lower border, camera
-        heights.
+        By how much wider the view is where the lane's road is nearest than at the map's lower border,
+        camera heights.
     bend : float
         By how much the camber that was fitted moves theta.
     camber : float or None
@@ -157,6 +158,7 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
     side = grid.centre_u / grid.scale
     leaves = min(surface.lowest / max(cosine, _LEAST_SPAN), side / max(sine, _LEAST_SPAN))
     border = model.disparity_along(leaves)
+    in_lane = _nearest_seen(plain[np.abs(model.side(across, plain)) < 1], 0.5 / tuning.groups) or nearest
 
     total = bands.sum(0)
     inverse, whole, changes, bulge = _solved(total, np.concatenate([bands, columns]), prior)
@@ -172,10 +174,20 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
         white=white[:4, :4],
         freedom=(_freedom(bands), _freedom(columns)),
         uneven=uneven / width,
-        hidden=width * (1 - nearest / max(border, nearest)),
+        hidden=view * abs(model.alpha[1]) * (1 / in_lane - 1 / max(border, in_lane)),
         bend=abs(model.camber * float(bulge[_THETA])),
         camber=_camber(model, prior_share, changes[:, _CAMBER]) if cambered else None,
     )
+
+
+def _nearest_seen(lane: Reals, share: float) -> float:
+    """Return the disparity where the lane begins to be seen, px, by that which a `share` of it is beyond.
+
+    An own bonnet is round: it hides the lane's nearest road, and not that beside it. The largest disparity
+    does not tell, as single pixels of a bonnet match. A lane is as wide as its disparity is large, so that
+    its area from the horizon on grows with the square. 0 where there is no lane.
+    """
+    return quantile(lane, 1 - share) / math.sqrt(1 - share) if lane.size else 0.0
 
 
 def _unevenness(

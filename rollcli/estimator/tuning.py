@@ -126,9 +126,9 @@ class IntervalTuning:
         it. With 4 the intervals of smooth rendered roads are half as wide again; with 2, 0.86 of the rough
         ones and 0.85 of the sweeps are covered.
     twist : float
-        By how much the lane turns between the lower border and the nearest pixel of the road that is seen:
-        radians per camera height that the view is wider there. Fitted to one half of 41 lidar sweeps and as
-        many pairs, without their lower 30 to 120 rows, it is 0.0021 or 0.0030.
+        By how much the lane turns between the lower border and where it begins to be seen: radians per
+        camera height that the view is wider there. Fitted to one half of 41 lidar sweeps and as many pairs,
+        without their lower 30 to 120 rows, it is 0.0021 or 0.0030.
     bend : float
         Of the angle by which the camber moves theta: a crown is no exact parabola.
     slant : float

@@ -252,6 +252,17 @@ def test_the_unevenness_of_waves_is_theirs_and_that_of_noise_is_none():
     assert smooth < 0.15 * rough
 
 
+def test_a_round_bonnet_hides_as_much_as_a_border_though_road_is_seen_beside_it_and_pixels_on_it():
+    rng = np.random.default_rng(4)
+    rows, columns = np.mgrid[:160, :640].astype(float)
+    plane = 1 + 0.2 * rows
+    for hidden, below in ((40, 120), (40, 120 + 40 * ((columns - 319.5) / 319.5) ** 2), (0, 160)):
+        seen = (rows < below) | (rng.uniform(size=rows.shape) < 0.02)
+        found = estimate_roll(np.where(seen, plane + rng.normal(0, 0.1, plane.shape), 0)).tangent.jackknife
+        wider = 640 * 0.2 * (1 / (plane.max() - 0.2 * hidden) - 1 / plane.max())
+        assert found.hidden == pytest.approx(wider, rel=0.15, abs=0.02)
+
+
 @pytest.mark.parametrize(("errors", "left"), [(1.9, 0), (4, 0.75), (-20, 0.99)])
 def test_the_camber_is_that_of_the_pixels_without_the_prior_less_what_noise_may_make_of_it(errors, left):
     problem, theta = fitted()
