@@ -16,7 +16,7 @@ from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
 from rollcli.stereo import sgbm
 from rollcli.stereo.match import StereoOptions, compute_disparity, match_pair
-from tests.odd_views import find_road
+from tests.odd_views import find_road, seen_by
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 ROADS = {"m1_L1": -3.47, "m1_L5": -1.62, "m2_L9": -2.54, "m2_L18": -4.30, "m3_L3": 2.36}
@@ -149,6 +149,27 @@ def test_a_rendered_street_is_matched_as_it_is(street):
     assert both.mean() > 0.4
     assert np.median(errors) < 0.3
     assert (errors > 3).mean() < 0.05
+
+
+@pytest.mark.parametrize(
+    ("lies", "noise", "doubted"),
+    [
+        ({"clockwise_deg": 2.2}, 0, True),
+        ({"larger_percent": 2.5}, 0, True),
+        ({"lower": 14}, 0, True),
+        ({"larger_percent": 0.5}, 0, False),
+        ({"larger_percent": 0.5}, 25, True),  # no rig is so, and the blocks do not agree
+        ({}, 25, False),
+    ],
+)
+def test_a_correction_that_no_rig_in_use_needs_is_doubted(lies, noise, doubted):
+    frame = render_frame(FrameSpec(scene="street", roll=math.radians(2), seed=5, colour=False))
+    rng = np.random.default_rng(0)
+    left, right = (
+        np.clip(view + rng.normal(0, noise, view.shape), 0, 255).astype(np.uint8)
+        for view in (frame.left, seen_by(frame.right, **lies))
+    )
+    assert ("too far from level" in match_pair(left, right, StereoOptions()).doubt) == doubted
 
 
 def test_the_same_pair_gives_the_same_map_whatever_the_threads(street):
