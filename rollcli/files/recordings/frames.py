@@ -339,7 +339,7 @@ def _calibration(
     if left is None or not left.usable:
         return None
     p, doffs = left.p, 0.0
-    if right is not None and right.usable and right.p[3] != 0:
+    if right is not None and right.usable and right.across != left.across:
         baseline, doffs = abs(left.across - right.across), right.p[2] - p[2]
     size = (left.width or None, left.height or None)
     return Calibration(p[0], p[5], p[2], p[6], baseline or None, doffs, *size, source=source)

@@ -236,7 +236,8 @@ def test_python_iterates_the_views_of_a_bag(tmp_path):
         yield "/jpeg/compressed", START, compressed(store, jpeg, "bgr8; jpeg", START)
         yield "/32FC1", START, image(store, np.ones((24, 32), np.float32), "32FC1", START)
         yield "/late", START, image(store, colours[..., 0], "mono8", START + 9_000_000)
-        for side, x, z in (("a", 22.4, 0.005), ("b", -168.0, 0.004)):  # P may refer to a third camera
+        # P may refer to a third camera, or to the right one
+        for side, x, z in (("a", 22.4, 0.005), ("b", -168.0, 0.004), ("c", 0.0, 0.0)):
             p = (350.0, 0, 16, x, 0, 350, 12, 0, 0, 0, 1, z)
             yield f"/{side}/camera_info", START, camera_info(store, START, (32, 24), p)
             yield f"/{side}/rect", START, image(store, colours[..., 0], "mono8", START)
@@ -247,8 +248,9 @@ def test_python_iterates_the_views_of_a_bag(tmp_path):
         np.testing.assert_array_equal(frame.right, colours[..., 0])
         assert (frame.stamp, frame.disparity) == (START, None)
         assert np.abs(frame.left.astype(int) - colours).max() <= (2 if "jpeg" in topic else 0)
-    (frame,) = package.open_recording(path, left_topic="/a/rect", right_topic="/b/rect")
-    assert frame.calibration.baseline == pytest.approx((22.4 + 168 - 16 * 0.001) / 350)
+    for right, times_focal in (("/b/rect", 22.4 + 168 - 16 * 0.001), ("/c/rect", 22.4 - 16 * 0.005)):
+        (frame,) = package.open_recording(path, left_topic="/a/rect", right_topic=right)
+        assert frame.calibration.baseline == pytest.approx(times_focal / 350)
     late = {"left_topic": "/rgb", "right_topic": "/late"}
     assert len(list(package.open_recording(path, **late, sync_tolerance=0.01))) == 1
     with pytest.raises(UsageError, match="are within 8 ms"):
