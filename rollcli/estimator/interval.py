@@ -153,7 +153,7 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
     uneven = _unevenness(heights, leverage, quarter, tuning.groups, tuning.levelled)
     cosine, sine, grid = abs(math.cos(theta)), abs(math.sin(theta)), surface.grid
     view = 2 * (grid.centre_u * cosine + grid.centre_v * sine) / grid.scale  # how wide it is across the road
-    width = view * abs(model.alpha[1]) / nearest
+    width_at_1 = view * abs(model.alpha[1])  # in camera heights, where the disparity is 1 px
     # where the middle of the lane leaves what was looked at
     side = grid.centre_u / grid.scale
     leaves = min(surface.lowest / max(cosine, _LEAST_SPAN), side / max(sine, _LEAST_SPAN))
@@ -173,8 +173,8 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
         columns=changes[tuning.groups :, :_CAMBER],
         white=white[:4, :4],
         freedom=(_freedom(bands), _freedom(columns)),
-        uneven=uneven / width,
-        hidden=view * abs(model.alpha[1]) * (1 / in_lane - 1 / max(border, in_lane)),
+        uneven=uneven / (width_at_1 / nearest),
+        hidden=width_at_1 * (1 / in_lane - 1 / max(border, in_lane)),
         bend=abs(model.camber * float(bulge[_THETA])),
         camber=_camber(model, prior_share, changes[:, _CAMBER]) if cambered else None,
     )

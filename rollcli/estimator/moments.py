@@ -85,10 +85,8 @@ def map_of(disparity: ArrayLike | None) -> NDArray[Any]:
     """
     if disparity is None:
         raise UsageError("the disparity map is None: nothing was read")
-    if isinstance(disparity, np.ma.MaskedArray):
-        return np.asarray(disparity.filled(0))
     try:
-        return np.asarray(disparity)
+        return _with_hidden_as_0(disparity)
     except (TypeError, ValueError) as error:
         raise UsageError(f"a disparity map is a 2-D array of real numbers: {error}") from error
 
@@ -102,13 +100,18 @@ def usable_of(mask: ArrayLike) -> NDArray[np.bool_]:
         It is no 2-D array of numbers.
     """
     try:
-        values = np.asarray(mask.filled(0) if isinstance(mask, np.ma.MaskedArray) else mask)
+        values = _with_hidden_as_0(mask)
         usable: NDArray[np.bool_] = (values > 0) | (values < 0)
     except (TypeError, ValueError) as error:
         raise UsageError(f"a mask is a 2-D array of numbers: {error}") from error
     if usable.ndim != 2:
         raise UsageError(f"a mask is a 2-D array of numbers, not {usable.ndim}-D")
     return usable
+
+
+def _with_hidden_as_0(values: ArrayLike) -> NDArray[Any]:
+    """Return an array in which what a masked one hides is 0."""
+    return np.asarray(values.filled(0) if isinstance(values, np.ma.MaskedArray) else values)
 
 
 def strips(height: int, rows: int) -> list[slice]:

@@ -152,5 +152,5 @@ def too_few(found: SequenceAssessment, quantity: Quantity = ROLL) -> str:
         return "a single frame"
     spread = f"{np.ptp(found.series.values[found.series.used]):.2f}{quantity.unit}"
     none = found.now.ci95 is None
-    takes = f"an interval takes {TUNING.fewest}" if none else f"a jump takes {2 * TUNING.fewest}"
+    takes = f"an interval takes {TUNING.fewest}" if none else f"a jump takes {TUNING.searched}"
     return f"{found.used:,} frames, which spread over {spread}; {takes}"

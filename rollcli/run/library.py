@@ -118,8 +118,10 @@ def estimate_roll(
         request = replace(request, middle=rig.for_size(*values.shape[::-1]).cx)
     like = partial(_likeness, values, seed)
     estimate, likeness = estimate_or_liken(values, request, like, mask=mask, road_mask=road_mask)
-    # the roll is the same at any scale, pitch and height are not
-    beyond = "" if rig is None else too_large(*_in_pixels(values), "px", PYTHON)
+    beyond = ""
+    if rig is not None and (values > values.shape[1]).any():  # most maps need not be read again for this
+        # the roll is the same at any scale, pitch and height are not
+        beyond = too_large(*_in_pixels(values), "px", PYTHON)
     message = "; ".join(filter(None, [likeness, estimate.message, beyond]))
     estimate = replace(estimate, status="suspect" if beyond else estimate.status, message=message)
     return estimate if rig is None else with_pose(estimate, rig)

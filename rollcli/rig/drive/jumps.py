@@ -45,7 +45,7 @@ def search(series: Series, unit: float) -> Found:
     Found
         Of the highest score.
     """
-    if series.used.sum() < 2 * TUNING.fewest:
+    if series.used.sum() < TUNING.searched:
         return Found((), False, 0.0)
     seen = _Search(series, unit)
     places = np.flatnonzero(series.used)

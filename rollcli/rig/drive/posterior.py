@@ -102,6 +102,11 @@ class SequenceTuning:
     drift_penalty: float = 2.0
     most_jumps: int = 12
 
+    @property
+    def searched(self) -> int:
+        """Frames that two stretches have: in fewer no jump and no drift is looked for."""
+        return 2 * self.fewest
+
 
 TUNING = SequenceTuning()
 

@@ -98,8 +98,8 @@ class SequenceAssessment:
 
     @property
     def searched(self) -> bool:
-        """Whether there are frames enough to look for jumps and a drift: those of two stretches."""
-        return self.used >= 2 * TUNING.fewest
+        """Whether there are frames enough to look for jumps and a drift."""
+        return self.used >= TUNING.searched
 
     @property
     def starts(self) -> list[int]:
