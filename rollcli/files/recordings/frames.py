@@ -73,8 +73,7 @@ def maps_of_bag(files: Sequence[str], name: str, topic: str | None) -> BagFrames
     chosen = topic or _only_map_topic(files, topics, name)
     found = _scan(files, [_known(topics, chosen, name)], topics)
     bag = BagFrames([(each, None) for each in found.frames[chosen]])
-    left = _camera(found, chosen, right=False)
-    right = _camera(found, chosen, right=True)
+    left, right = _cameras(found, chosen)
     stated = 0.0
     for each in found.frames[chosen] if topics[chosen].type == DISPARITY else ():
         with contextlib.suppress(InputError):  # a damaged one says so in its row
@@ -321,15 +320,22 @@ def _beside(topic: str) -> str:
     return f"{topic.removesuffix('/compressed').rpartition('/')[0]}/camera_info"
 
 
-def _camera(found: _Found, topic: str, *, right: bool) -> CameraInfo | None:
-    """Return the left, or right, camera: of several the nearest by namespace, then one that is called so."""
-    fitting = [name for name, info in found.cameras.items() if info.usable and (info.p[3] != 0) is right]
+def _cameras(found: _Found, topic: str) -> tuple[CameraInfo | None, CameraInfo | None]:
+    """Return the left and the right camera: the nearest by namespace, then those that are called so."""
+    usable = [(name, info) for name, info in found.cameras.items() if info.usable]
 
-    def nearness(name: str) -> tuple[int, bool, str]:
-        shared = os.path.commonprefix([name.split("/"), topic.split("/")])  # noqa: RUF071 (of parts)
-        return len(shared), _SIDES[right] in name, name
+    def nearest(side: str, fitting: list[tuple[str, CameraInfo]]) -> CameraInfo | None:
+        def nearness(camera: tuple[str, CameraInfo]) -> tuple[int, bool, float, str]:
+            name, info = camera
+            shared = os.path.commonprefix([name.split("/"), topic.split("/")])  # noqa: RUF071 (of parts)
+            return len(shared), side in name, info.across, name
 
-    return found.cameras[max(fitting, key=nearness)] if fitting else None
+        return max(fitting, key=nearness)[1] if fitting else None
+
+    # the origin of P is the left camera, the right one or one between them
+    left = nearest("left", [each for each in usable if each[1].across >= 0])
+    right = nearest("right", [each for each in usable if left is None or each[1].across < left.across])
+    return left, right
 
 
 def _calibration(
