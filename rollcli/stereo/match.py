@@ -68,8 +68,8 @@ def check_same_scene(small: SmallViews, look: FirstLook, measured: Measured | No
         height, width = small.views[0].shape
         small_ones = f"are too small to compare ({width}x{height} px), or " if width < _COMPARED_FROM else ""
         raise InputError(
-            f"the two images {small_ones}do not show the same scene: hardly anything in one is found in the "
-            "other"
+            f"the two images {small_ones}do not show the same scene or are not rectified: hardly anything in "
+            "one is found in the same rows of the other"
         )
 
 
@@ -98,7 +98,7 @@ _OPEN_PITCH = 0.0003
 _FURTHEST = 12.0, 0.03, 0.02  # offset, rotation and scale that no rig in use has: px, radians, share
 # the doubts of a pair: its correction was still changing when it was given up, or could not be checked; its
 # columns may be far from where they are believed to be; it is not level once it was levelled as a file says
-NOT_LEVELLED = "the views are not level, and could not be levelled"
+NOT_LEVELLED = "the views are not level, and could not be levelled, as where they are not rectified"
 TOO_LITTLE = "too little can be compared to tell whether the views are level"
 NOT_TOLD_BY_ROWS = "the rows do not tell whether the right view is larger or its rows are bent: recalibrate"
 PITCH_NOT_TOLD = "the rows do not tell whether the right camera is pitched or its image shifted: recalibrate"
