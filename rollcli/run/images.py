@@ -170,6 +170,18 @@ def require_angle(frame: Frame, options: FrameOptions) -> None:
         raise InputError(f"{frame.file}: has no angle in {options.convert.result}")
 
 
+def _require_size(
+    file: str, source: Source, road: Row | RollEstimate | FittedRoad, result: str | None
+) -> None:
+    """Refuse a map that has another size than its row of the result: that road is not the map's."""
+    height, width = source.disparity.shape
+    if road.width is not None and (road.width, road.height) != (width, height):
+        raise InputError(
+            f"{file}: has {width}x{height} px, its row in {result} {road.width}x{road.height}: "
+            "name the result of these maps"
+        )
+
+
 def converted(frame: Frame, source: Source, options: FrameOptions) -> Made:
     """Make the files that a conversion makes of a frame."""
     make = _MAKERS[type(options.convert)]
@@ -208,6 +220,7 @@ def _counted(source: Source, of: Frame, options: VDisparityOptions, paths: Mappi
         from rollcli.pictures.figures import v_disparity_figure  # loads matplotlib, an extra
 
         road: Row | RollEstimate = of.row or estimate_roll(source.disparity)
+        _require_size(of.file, source, road, options.result)
         theta = math.radians(road.map_roll_deg or 0.0) if isinstance(road, Row) else road.theta
         figure = v_disparity_figure(source.disparity, theta, road.alpha, options.figure, **counting)
         return {paths["vdisparity"]: figure}, dict(source.warnings)
@@ -240,16 +253,11 @@ def _heights_of_row(
     source: Source, frame: Frame, options: HeightsOptions, paths: Mapping[str, str]
 ) -> _Files:
     """Measure the heights of the map over the road of its row, and draw them if that was requested."""
-    height, width = source.disparity.shape
     calibration = source.calibrated(frame.calibration)
     road = None if frame.row is None else FittedRoad.of_row(frame.row, calibration)
     if road is None:
         raise InputError(f"{frame.file}: its row in {options.result} has no road (alpha0, alpha1, alpha2)")
-    if (road.width, road.height) != (width, height):
-        raise InputError(
-            f"{frame.file}: has {width}x{height} px, its row in {options.result} {road.width}x{road.height}: "
-            "name the result of these maps"
-        )
+    _require_size(frame.file, source, road, options.result)
     heights, unit = heights_over(source.disparity, road, calibration), unit_of(calibration)
     files = {paths["heights"]: encode_heights(heights, options.save_as, unit)}
     if options.preview is not None:
