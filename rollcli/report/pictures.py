@@ -63,7 +63,7 @@ class Pictures:
 
 def take_pictures(subject: Subject) -> Pictures:
     """Take what can be taken: from the images of the subject, else from its map or pair."""
-    source, missing = _attempt(lambda: _source(subject))
+    source, missing = _attempt(lambda: _source(subject).require_size(subject.frame.file, subject.row))
     disparity = None if source is None else source.shown
     level, _ = _attempt(lambda: _level(subject, disparity))
     makers: dict[str, Callable[[], NDArray[Any] | None]] = {

@@ -170,18 +170,6 @@ def require_angle(frame: Frame, options: FrameOptions) -> None:
         raise InputError(f"{frame.file}: has no angle in {options.convert.result}")
 
 
-def _require_size(
-    file: str, source: Source, road: Row | RollEstimate | FittedRoad, result: str | None
-) -> None:
-    """Refuse a map that has another size than its row of the result: that road is not the map's."""
-    height, width = source.disparity.shape
-    if road.width is not None and (road.width, road.height) != (width, height):
-        raise InputError(
-            f"{file}: has {width}x{height} px, its row in {result} {road.width}x{road.height}: "
-            "name the result of these maps"
-        )
-
-
 def converted(frame: Frame, source: Source, options: FrameOptions) -> Made:
     """Make the files that a conversion makes of a frame."""
     make = _MAKERS[type(options.convert)]
@@ -220,7 +208,7 @@ def _counted(source: Source, of: Frame, options: VDisparityOptions, paths: Mappi
         from rollcli.pictures.figures import v_disparity_figure  # loads matplotlib, an extra
 
         road: Row | RollEstimate = of.row or estimate_roll(source.disparity)
-        _require_size(of.file, source, road, options.result)
+        source.require_size(of.file, of.row, f" in {options.result}")
         theta = math.radians(road.map_roll_deg or 0.0) if isinstance(road, Row) else road.theta
         figure = v_disparity_figure(source.disparity, theta, road.alpha, options.figure, **counting)
         return {paths["vdisparity"]: figure}, dict(source.warnings)
@@ -257,7 +245,7 @@ def _heights_of_row(
     road = None if frame.row is None else FittedRoad.of_row(frame.row, calibration)
     if road is None:
         raise InputError(f"{frame.file}: its row in {options.result} has no road (alpha0, alpha1, alpha2)")
-    _require_size(frame.file, source, road, options.result)
+    source.require_size(frame.file, frame.row, f" in {options.result}")
     heights, unit = heights_over(source.disparity, road, calibration), unit_of(calibration)
     files = {paths["heights"]: encode_heights(heights, options.save_as, unit)}
     if options.preview is not None:

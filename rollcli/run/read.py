@@ -18,7 +18,7 @@ from rollcli.estimator.road.find import Plane, road_plane
 from rollcli.files.codecs.pictures import views_of
 from rollcli.files.encodings import Encoding, to_disparity
 from rollcli.files.formats import Stored, decode_mask, read_image, read_stored
-from rollcli.files.results import ALIGNMENT_COLUMNS
+from rollcli.files.results import ALIGNMENT_COLUMNS, Row
 from rollcli.files.storage import noting, read_bytes, state_of
 from rollcli.messages import one_line
 from rollcli.rig.calibration import Calibration
@@ -127,6 +127,21 @@ class Source:
     size: tuple[int, int] | None = None
     match: "StereoMatch | None" = None
     photo: NDArray[Any] | None = None
+
+    def require_size(self, file: str, row: Row | None, result: str = "") -> "Source":
+        """Return the source, unless its row is of a map of another size: that road is not this map's.
+
+        Raises
+        ------
+        InputError
+        """
+        shape = self.disparity.shape
+        if row is not None and row.width is not None and (row.height, row.width) != shape:
+            raise InputError(
+                f"{file}: has {_size(shape)} px, its row{result} {row.width}x{row.height}: "
+                "name the result of these maps"
+            )
+        return self
 
     @property
     def doubt(self) -> str:

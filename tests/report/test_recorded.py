@@ -424,6 +424,7 @@ def _taken(images=(), disparity=ROAD, roll=5.75, camera=None, **options):
             np.save(f"{folder}/{name}.npy", disparity / (1 if name == "a" else 20))
         cv2.imwrite(f"{folder}/photo.png", np.random.default_rng(1).integers(0, 256, (60, 80, 3), np.uint8))
         given = replace(row(f"{folder}/a.npy", roll), alpha0=-8.0, alpha1=0.4, height_m=camera)
+        given = replace(given, width=disparity.shape[1], height=disparity.shape[0])
         drawn = ImageOptions(heights_range=(-0.3, 0.3))
         settings = FrameOptions(encoding=EncodingOptions("px"), images=drawn)
         (subject,) = subjects([given], f"{folder}/rolls.csv", None, settings)
@@ -458,6 +459,7 @@ TAKEN = {
     "of nothing": partial(_taken, refused="it is far away"),
     "of a map among images": partial(_taken, [("disparity", "a.npy")], camera=1.5, images_only=True),
     "of no parabola": partial(_taken, alpha=None),
+    "of another size": partial(_taken, row=replace(row("a.png"), width=80)),
     "turned back": partial(_taken, theta=-0.5),
     "of a kerb": partial(_taken, disparity=KERB, roll=0.0),
     "of a kerb and a height": partial(_taken, disparity=KERB, roll=0.0, camera=2.0),
