@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from rollcli.errors import InputError, UsageError
 from rollcli.rig.calibration import Calibration, CalibrationOptions
 from rollcli.rig.formats import datasets, opencv, robots
 from rollcli.rig.formats.fields import Fields, File, has_key
+
+Known = TypeVar("Known", Fields, Calibration)
 
 MAX_BYTES = 1 << 20  # real ones have a few thousand
 
@@ -64,12 +66,27 @@ def parse_calibration(
     given = given or CalibrationOptions()
     fields = _read([_text(name, data) for name, data in files]) if files else Fields()
     source = " and ".join(name for name, _ in files)
+    return _complete(_overridden(fields, given), _source(source, given), source)
+
+
+def with_numbers(calibration: Calibration, given: CalibrationOptions) -> Calibration:
+    """Return the calibration that a bag holds, with a user's numbers in place of its own.
+
+    Raises
+    ------
+    UsageError
+        They cannot be those of a rig.
+    """
+    return _overridden(replace(calibration, source=_source(calibration.source, given)), given)
+
+
+def _source(files: str, given: CalibrationOptions) -> str:
     options = [
         f"--{name.replace('_', '-')}"
         for name, value in given._asdict().items()
         if value is not None and name != "calib"
     ]
-    return _complete(_overridden(fields, given), ", ".join(filter(None, [source, *options])), source)
+    return ", ".join(filter(None, [files, *options]))
 
 
 def _text(name: str, data: bytes) -> File:
@@ -96,12 +113,12 @@ def _read(files: Sequence[File]) -> Fields:
     return forms[0].read(*files)
 
 
-def _overridden(fields: Fields, given: CalibrationOptions) -> Fields:
+def _overridden(known: Known, given: CalibrationOptions) -> Known:
     cx, cy = given.principal_point or (None, None)
     numbers: dict[str, Any] = {"fx": given.focal, "fy": given.focal, "cx": cx, "cy": cy, "doffs": given.doffs}
-    fields = replace(fields, **{name: value for name, value in numbers.items() if value is not None})
-    # what the file's notes say is about its own baseline
-    return fields if given.baseline is None else replace(fields, baseline=given.baseline, notes=())
+    if given.baseline is not None:  # what the file's notes say is about its own one
+        numbers |= {"baseline": given.baseline, "notes": ()}
+    return replace(known, **{name: value for name, value in numbers.items() if value is not None})
 
 
 def _complete(fields: Fields, source: str, file: str) -> Calibration:

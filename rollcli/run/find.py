@@ -3,7 +3,7 @@
 import itertools
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, overload
 
@@ -18,7 +18,7 @@ from rollcli.files.storage import fetch_all, read_bytes
 from rollcli.files.stores.locations import is_url, names_a_file, public_name
 from rollcli.messages import say
 from rollcli.rig.calibration import Calibration, CalibrationOptions, require_calibration
-from rollcli.rig.read_calibration import MAX_BYTES, parse_calibration
+from rollcli.rig.read_calibration import MAX_BYTES, parse_calibration, with_numbers
 from rollcli.run.frame import Frame
 from rollcli.run.options import EncodingOptions, FrameOptions, FramesOptions, InputOptions, Layout
 
@@ -395,8 +395,10 @@ def _bag_frames(bags: "Iterable[BagFrames]", make: "_FrameMaker", options: Frame
     frames: list[Frame] = []
     taken = _each_of(options.inputs.every)
     for bag in bags:
-        _tell(bag.notes, options)
-        frames += [make.frame(left, right, bag.calibration) for left, right in bag.frames if taken(left)]
+        known, given = bag.calibration, options.calibration
+        _tell([*bag.notes, *([] if given.given else bag.uncalibrated)], options)
+        known = None if known is None or given.calib else with_numbers(known, given)
+        frames += [make.frame(left, right, known) for left, right in bag.frames if taken(left)]
     return frames
 
 
@@ -404,11 +406,15 @@ class _FrameMaker:
     """Makes frames, with the masks and calibrations that were named: one for all, or one of each stem."""
 
     def __init__(self, options: FramesOptions) -> None:
-        self._calibration = calibration_finder(options.calibration)
+        self._given = options.calibration
         self._mask = mask_finder(options.region.mask)
 
+    @cached_property
+    def _calibration(self) -> Callable[[str], Calibration | None]:
+        return calibration_finder(self._given)
+
     def frame(self, left: Input, right: Input | None = None, calibration: Calibration | None = None) -> Frame:
-        """Make the frame of a map, or of the views of a pair; `calibration` is that of its bag."""
+        """Make the frame of a map, or of the views of a pair; `calibration` is that of its bag, if any."""
         # what is made of an input must stay in its folder, whatever a store or an archive calls it
         foreign = is_url(left.location) or file_of(left.location) != left.location
         return Frame(
@@ -418,5 +424,5 @@ class _FrameMaker:
             right_path=right.location if right else "",
             relative=left.relative if not foreign or names_a_file(left.relative) else "",
             mask=self._mask(left.name),
-            calibration=self._calibration(left.name) or calibration,
+            calibration=calibration or self._calibration(left.name),
         )

@@ -35,11 +35,14 @@ class BagFrames:
         Of the rectified pair, by CameraInfo.
     notes : list of str
         What the user should know, a line each.
+    uncalibrated : list of str
+        What a user should know who gives no calibration.
     """
 
     frames: list[tuple[Input, Input | None]] = field(default_factory=list)
     calibration: Calibration | None = None
     notes: list[str] = field(default_factory=list)
+    uncalibrated: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -86,7 +89,7 @@ def maps_of_bag(files: Sequence[str], name: str, topic: str | None) -> BagFrames
         # its disparities are x_l - x_r - (cx_l - cx_r) already [stereo_msgs/DisparityImage]
         bag.calibration = replace(bag.calibration, doffs=0.0)
     if bag.calibration is None and (found.cameras or topics[chosen].type == DISPARITY):
-        bag.notes.append(f"{name}: {_NO_P}")
+        bag.uncalibrated.append(f"{name}: {_NO_P}")
     _finish(bag, found, name, chosen)
     return bag
 
@@ -134,7 +137,7 @@ def pairs_of_bag(files: Sequence[str], name: str, left: str, right: str, toleran
     one, other = (found.cameras.get(_beside(topic)) for topic in (left, right))
     bag.calibration = _calibration(one, other, 0.0, f"CameraInfo of {name}")
     if bag.calibration is None and found.cameras:
-        bag.notes.append(f"{name}: {_beside(left)} is {_NO_P}")
+        bag.uncalibrated.append(f"{name}: {_beside(left)} is {_NO_P}")
     _finish(bag, found, name, f"{left} and {right}")
     return bag
 
