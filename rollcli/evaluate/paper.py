@@ -12,6 +12,7 @@ from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.extras import require_extra
 from rollcli.files.inputs import stem_of
 from rollcli.files.storage import write_output
+from rollcli.files.stores.locations import is_url
 from rollcli.run.find import find_frames
 from rollcli.run.frame import Frame
 from rollcli.run.outputs import listed_only
@@ -54,7 +55,7 @@ def run_paper(options: PaperOptions) -> ExitStatus:
     truth = _known_angles(frames, options)
     kind = options.experiments.figure
     names = [f"{name}.{kind}" for name in FIGURES] if kind is not None else []
-    writes = [str(Path(folder, name)) for name in (*(f"{name}.csv" for name in TABLES), *names, PAGE)]
+    writes = [_place(folder, name) for name in (*(f"{name}.csv" for name in TABLES), *names, PAGE)]
     reads = [path for frame in frames for path in frame.reads()]
     if listed_only(reads, writes, options.running):
         return ExitStatus.DONE
@@ -98,7 +99,7 @@ def _run(frames: Sequence[Frame], truth: Mapping[str, KnownPose], options: Paper
         return progress.summary.status
     times = _time(frames, found, options, progress)
     _write(found, failed, times, options)
-    progress.note(f"{Path(options.experiments.output, PAGE)} and {len(TABLES)} tables are written")
+    progress.note(f"{_place(options.experiments.output, PAGE)} and {len(TABLES)} tables are written")
     return progress.summary.status
 
 
@@ -124,12 +125,15 @@ def _write(
     from rollcli.report.figures import chart_file
 
     tables = all_tables(found, failed, times)
-    folder = Path(options.experiments.output)
     figures = paper_figures(tables)
     page = paper_page(tables, figures, found, failed, times, options)
-    written = {folder / f"{name}.csv": table_csv(tables[name]) for name in TABLES} | {folder / PAGE: page}
+    written = {f"{name}.csv": table_csv(tables[name]) for name in TABLES} | {PAGE: page}
     if (kind := options.experiments.figure) is not None:
         for name, figure in figures.items():
-            written[folder / f"{name}.{kind}"] = chart_file(figure, kind, PRINT)
-    for path, data in written.items():
-        write_output(str(path), data, overwrite=options.running.overwrite)
+            written[f"{name}.{kind}"] = chart_file(figure, kind, PRINT)
+    for name, data in written.items():
+        write_output(_place(options.experiments.output, name), data, overwrite=options.running.overwrite)
+
+
+def _place(folder: str, name: str) -> str:
+    return f"{folder.rstrip('/')}/{name}" if is_url(folder) else str(Path(folder, name))

@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 
 from rollcli.errors import UsageError, as_usage, reading
 from rollcli.files.bounded import MOST_SETTINGS, read_given
+from rollcli.files.storage import read_bytes
+from rollcli.files.stores.locations import is_url
 from rollcli.stereo.misalignment import ColumnSupport, Misalignment
 
 _VALUES = ("right_lower_px", "right_clockwise_deg", "right_larger_percent", "right_twist_px")
@@ -84,7 +86,8 @@ def read_correction(path: str) -> Correction:
     """
     try:
         with as_usage(), reading(f"--align {path}"):
-            found = json.loads(read_given(path, MOST_SETTINGS))
+            data = read_bytes(path, most=MOST_SETTINGS) if is_url(path) else read_given(path, MOST_SETTINGS)
+        found = json.loads(data)
         values, bend = [float(found[name]) for name in _VALUES], float(found.get(_BEND, 0.0))
         width, height = int(found["width"]), int(found["height"])
         columns = None

@@ -74,6 +74,8 @@ def test_what_a_store_objects_to_is_said_before_any_work(bucket, store, tmp_path
         (["derotate", "maps", "--roll", "1", "-o", "s3://nowhere/up"], "there is no such bucket"),
         (["disparity", *VIEWS, "-o", "d", "--preview", "s3://nowhere/p"], "there is no such bucket"),
         (["rig", "s3://maps/none.csv"], "there is no such object"),
+        (["estimate", *VIEWS, "--align", "s3://maps/none.json"], "there is no such object"),
+        (["evaluate", "paper", "maps", "-o", "s3://nowhere/p"], "there is no such bucket"),
     ],
 )
 def test_a_wrong_address_is_one_line_before_any_work(bucket, tmp_path, words, said):
@@ -119,8 +121,7 @@ def test_a_signed_address_works_and_is_shown_nowhere(web, tmp_path):
     write_kitti(tmp_path / "web" / "mask.png", road_map())
     (tmp_path / "web" / "broken.png").write_bytes(b"no map")
     maps = [f"{web}/{name}.png{SIGNED}" for name in ("map%201", "broken", "none")]
-    line = ("estimate", *maps, "--mask", f"{web}/mask.png{SIGNED}")
-    line = (*line, "-o", "rolls.csv", "--derotated", "up", "-v")
+    line = ("estimate", *maps, "--mask", f"{web}/mask.png{SIGNED}", "-o", "rolls.csv", "--derotated=up", "-v")
     listed = rollcli(*line, "--dry-run", cwd=tmp_path)
     done = rollcli(*line, cwd=tmp_path)
     assert done.status == 3
