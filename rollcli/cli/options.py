@@ -66,7 +66,7 @@ input_options = record(
     records.InputOptions,
     *_named,
     option("--sorted", FLAG),
-    option("--topic", Text("TOPIC")),
+    option("--topic", Text("TOPIC"), _MAPS),
     *_folders,
 )
 
@@ -88,7 +88,11 @@ topic_options = record(
     records.TopicOptions,
     option("--left-topic", Text("TOPIC")),
     option("--right-topic", Text("TOPIC")),
-    option("--sync-tolerance", Number("MS", at_least=0)),
+    option(
+        "--sync-tolerance",
+        Number("MS", at_least=0),
+        Needs(lambda ctx: ctx.params["left_topic"], "only views of a bag are paired by their stamps"),
+    ),
 )
 
 stereo_options = record(
