@@ -15,7 +15,7 @@ from rollcli.files.storage import write_output
 from rollcli.files.stores.locations import is_url
 from rollcli.run.find import find_frames
 from rollcli.run.frame import Frame
-from rollcli.run.outputs import listed_only
+from rollcli.run.outputs import check_places, listed_only
 from rollcli.run.progress import Progress
 from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import stop_on_signals
@@ -52,6 +52,7 @@ def run_paper(options: PaperOptions) -> ExitStatus:
     if options.encoding.encoding == "depth":
         raise UsageError("--encoding depth: the experiments are made on disparity maps, not on depth maps")
     frames, folder = find_frames(options), options.experiments.output
+    check_places(frames, options.folders)
     truth = _known_angles(frames, options)
     kind = options.experiments.figure
     names = [f"{name}.{kind}" for name in FIGURES] if kind is not None else []
