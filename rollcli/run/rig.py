@@ -28,7 +28,7 @@ from rollcli.run.read import FRAME_ERRORS, read_views, road_finder
 from rollcli.run.result_rows import frame_of_row
 from rollcli.run.resume import recorded_options
 from rollcli.run.rig_gates import check_options, health_of, run_checks, status_of
-from rollcli.run.rig_text import FORMATS, NO_COLUMNS, Findings, correction_text
+from rollcli.run.rig_text import FORMATS, NO_COLUMNS, Findings, correction_text, moves
 from rollcli.stereo.alignment import Measured
 from rollcli.stereo.correction import DriveRows
 from rollcli.stereo.match import match_pair
@@ -248,7 +248,7 @@ def run_rig(options: RigOptions) -> int:
     if not options.running.quiet:
         say(*notes)
         if options.format != "table" or not is_stream(options.output):
-            say(*findings(rig))
+            say(*findings(rig), *moves(found))
     said = {False: "FAILED", None: "cannot tell"}
     say(*(f"{said[check.ok]}: {check.message}" for check in checks if not check.ok))
     return status_of(checks)

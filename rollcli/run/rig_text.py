@@ -209,8 +209,7 @@ def _lines(found: Findings) -> Iterator[str]:
         yield f"jumps   {len(jumps) or ('none' if told else 'too few frames to tell')}"
     yield from (f"        {line}" for line in jumps)
     yield from _segment_lines(rig)
-    for quantity in QUANTITIES if found.changes else ():
-        yield from _moved(quantity, found.changes[quantity.name])
+    yield from moves(found)
     if found.health is not None:
         yield from found.health.lines()
     sentences = findings(rig, roll=False)
@@ -236,13 +235,14 @@ def _segment_lines(rig: RigAssessment) -> Iterator[str]:
         yield f"and {len(rows) - _SEGMENTS_SHOWN:,} more segments; --format csv lists all"
 
 
-def _moved(quantity: Quantity, change: Estimate) -> Iterator[str]:
-    """Whether the rig has moved from one result to the other."""
-    if change.value is None:
-        return
+def moves(found: Findings) -> Iterator[str]:
+    """Whether the rig has moved from one result to the other, a line for each quantity that tells."""
     told = {True: "it has moved", False: "no move is seen", None: "too few frames for an interval"}
-    said = answer(change, quantity, change=True)
-    yield f"{quantity.name} against the other result: {said}, {told[moved(change)]}"
+    for quantity in QUANTITIES if found.changes else ():
+        change = found.changes[quantity.name]
+        if change.value is not None:
+            said = answer(change, quantity, change=True)
+            yield f"{quantity.name} against the other result: {said}, {told[moved(change)]}"
 
 
 _CALL = (
