@@ -11,7 +11,7 @@ import click
 from click.core import ParameterSource
 
 from rollcli.cli import options as shared
-from rollcli.cli.command import command, config_option, option, record
+from rollcli.cli.command import Needs, command, config_option, option, record
 from rollcli.cli.types import FLAG, SHARD, Choice, Number, OutputFile
 from rollcli.messages import without_secrets
 from rollcli.run.options import EstimateOptions, ResultOptions
@@ -84,7 +84,11 @@ result_options = record(
     option("--update", FLAG),
     option("--retry-failed", FLAG),
     option("--shard", SHARD),
-    option("--shard-by", Choice("every", "range")),
+    option(
+        "--shard-by",
+        Choice("every", "range"),
+        Needs(lambda ctx: ctx.params["shard"] != (1, 1), "all frames are one shard"),
+    ),
     option("--fail-fast", FLAG),
     option("--timing", FLAG),
 )

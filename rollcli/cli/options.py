@@ -209,6 +209,10 @@ method_options = record(
 heights_range_option = option(
     "--heights-range",
     WIDE_SPAN,
+    Needs(
+        lambda ctx: ctx.params.get("preview") or ctx.params.get("heights_preview"),
+        "only previews of heights have colours",
+    ),
     text="Heights with the outermost colours of a preview, A:B, metres or camera heights.",
     section="Output",
     default="{:.2f}:{:.2f}".format(*records.HEIGHTS_RANGE),
