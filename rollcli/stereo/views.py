@@ -101,6 +101,41 @@ def _brighter(dark: NDArray[np.float64], bright: NDArray[np.float64]) -> View:
     return levels
 
 
+# times as much of it, from which on a view is smoothed: none of 79 real pairs differs by more than 1.22, and
+# all of those with lidar by 1.33 and more where the right view is blurred by 0.5 px
+_AS_SHARP = 1.25
+_BLURS = 0.25, 4.0  # px, the least and the most
+_HALVINGS = 8
+
+
+def as_sharp(views: Views) -> Views:
+    """Smooth the sharper view until it is as sharp as the other, where one is out of focus.
+
+    Where fine texture is in one view alone, costs compare it with none, and so do the least squares that
+    measure how the right view lies.
+    """
+    fine = _fineness(views[0]), _fineness(views[1])
+    if max(fine) < _AS_SHARP * min(fine):
+        return views
+    sharper = int(fine[1] > fine[0])
+    least, most = _BLURS
+    for _ in range(_HALVINGS):
+        middle = (least + most) / 2
+        blurred: View = cv2.GaussianBlur(views[sharper], (0, 0), middle).astype(np.uint8, copy=False)
+        if _fineness(blurred) > min(fine):
+            least = middle
+        else:
+            most = middle
+    return (views[0], blurred) if sharper else (blurred, views[1])
+
+
+def _fineness(view: View) -> float:
+    """Return how much of what varies down the columns does so from row to row; gain and offset leave it."""
+    few = view[:, ::_EVERY].astype(np.float32)
+    near, far = (float(np.sum(np.square(few[step:] - few[:-step]))) for step in (1, 4))
+    return near / far if far else 1.0
+
+
 _DARK = 128  # grey level; skies are brighter, and of one level where they are overexposed
 _PATCH = np.ones((3, 3), np.uint8)  # px: single pixels are clipped where there is texture
 _AROUND = np.ones((5, 5), np.uint8)  # px: makes a patch as large again, and a pixel larger

@@ -7,6 +7,7 @@ import pytest
 from rollcli.errors import InputError
 from rollcli.stereo.views import (
     as_bright,
+    as_sharp,
     matched_shape,
     prepare_views,
     sampled,
@@ -127,11 +128,13 @@ def test_what_is_halfway_between_two_grey_levels_is_rounded_up_in_every_column()
 
 
 @pytest.mark.parametrize(("left", "right"), [(1.0, 0.5), (0.4, 1.0), (0.7, 1.3)])
-def test_a_view_that_was_exposed_less_is_brightened_to_the_other(left, right):
+def test_a_view_exposed_less_is_brightened_to_the_other_and_one_in_focus_smoothed_to_it(left, right):
     grey = cv2.GaussianBlur(np.random.default_rng(0).integers(0, 256, (60, 80), dtype=np.uint8), (0, 0), 1.5)
 
     one, other = as_bright(tuple(np.minimum(grey * by, 255).astype(np.uint8) for by in (left, right)))
 
+    np.testing.assert_allclose(one.astype(int), other.astype(int), atol=4)
+    one, other = as_sharp((cv2.GaussianBlur(grey, (0, 0), 2), grey))
     np.testing.assert_allclose(one.astype(int), other.astype(int), atol=4)
 
 
