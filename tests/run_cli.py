@@ -5,6 +5,7 @@ import csv
 import io
 import os
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -123,6 +124,17 @@ with atomic_file(sys.argv[1]) as file:
 def leave_half(path: Path) -> None:
     """Leave what a process leaves that is killed while it writes this file."""
     subprocess.run([sys.executable, "-c", _HALF, path], check=False)
+
+
+def interrupt_in(patch: Any, module: Any, name: str) -> None:
+    """Send this process a Ctrl-C before each call of a module's function, which is then done all the same."""
+    work = getattr(module, name)
+
+    def interrupted(*arguments: Any, **options: Any) -> Any:
+        signal.raise_signal(signal.SIGINT)
+        return work(*arguments, **options)
+
+    patch.setattr(module, name, interrupted)
 
 
 def wait_until(condition: Callable[[], object], run: "subprocess.Popen[Any] | None" = None) -> None:

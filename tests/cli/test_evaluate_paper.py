@@ -3,7 +3,6 @@
 import importlib.util
 import re
 import shutil
-import signal
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from rollcli.evaluate import experiments as job
 from rollcli.evaluate.paper import PAGE, TABLES
 from rollcli.run.workers import tasks as run_tasks
 from tests.estimator.synthetic_maps import bent_road
-from tests.run_cli import contents, rollcli, rows_of
+from tests.run_cli import contents, interrupt_in, rollcli, rows_of
 
 FAST = ("--turns", "-8:8:8", "--timed", "1")
 
@@ -113,13 +112,7 @@ def test_errors_that_hardly_differ_have_a_scale(tmp_path):
 
 def test_an_interrupted_evaluation_writes_nothing(tmp_path, monkeypatch):
     write_maps(tmp_path / "maps", "a.npy", "b.npy")
-    examine_one = job.examine_file
-
-    def interrupted(*arguments, **options):
-        signal.raise_signal(signal.SIGINT)
-        return examine_one(*arguments, **options)
-
-    monkeypatch.setattr(job, "examine_file", interrupted)
+    interrupt_in(monkeypatch, job, "examine_file")
     monkeypatch.setattr(run_tasks, "_usable_processors", lambda: 1)
     run = paper(tmp_path)
     assert run.status == 130

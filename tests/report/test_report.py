@@ -7,7 +7,6 @@ import json
 import os
 import re
 import shutil
-import signal
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import datetime, timezone
@@ -19,7 +18,7 @@ import pytest
 from rollcli.files.results import read_result
 from rollcli.report import pictures
 from tests.report.results import row, write_result
-from tests.run_cli import road_map, rollcli, write_kitti, write_maps
+from tests.run_cli import interrupt_in, road_map, rollcli, write_kitti, write_maps
 
 pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
 pytest.importorskip("jinja2", reason="jinja2, of the extra report, is not here")
@@ -158,13 +157,7 @@ def test_a_road_that_the_result_was_not_made_from_is_not_shown(tmp_path):
 
 
 def test_an_interrupted_report_writes_nothing(folder, monkeypatch):
-    take_one = pictures.take_pictures
-
-    def interrupted(*arguments, **options):
-        signal.raise_signal(signal.SIGINT)
-        return take_one(*arguments, **options)
-
-    monkeypatch.setattr(pictures, "take_pictures", interrupted)
+    interrupt_in(monkeypatch, pictures, "take_pictures")
     done = report(folder, "out/rolls.csv")
     assert (done.status, done.err) == (130, "rollcli: interrupted; nothing is written\n")
     assert not (folder / "page.html").exists()

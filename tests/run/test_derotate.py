@@ -1,8 +1,6 @@
 """`rollcli derotate`: maps keep what they are, and every map gets its own angle."""
 
 import math
-import shutil
-import signal
 from itertools import product
 
 import numpy as np
@@ -13,9 +11,9 @@ from rollcli.estimator.request import Request
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import encode_stored, read_stored
 from rollcli.run import frame_work
-from rollcli.run.frame_work import do_frame
-from tests.run_cli import contents, road_map, rollcli, rows_of, write_kitti, write_maps
+from tests.run_cli import contents, interrupt_in, road_map, rollcli, rows_of, write_kitti
 
+FRAMES = 4
 TYPES = {
     "png": ["u1", "u2"],
     "tiff": ["u1", "i1", "u2", "i2", "u4", "i4", "f4", "f8"],
@@ -59,25 +57,12 @@ def test_a_map_keeps_its_format_type_and_encoding(tmp_path, form, dtype, encodin
     assert math.degrees(roll) == pytest.approx(0, abs=0.05 + 2 * STEPS[encoding])
 
 
-@pytest.fixture(scope="module")
-def estimated(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("estimated")
-    write_maps(folder / "maps", 4)
-    line = ["estimate", "maps", "-o", "rolls.csv", "--derotated", "upright"]
-    assert rollcli(*line, cwd=folder).status == 0
-    return folder
-
-
-@pytest.fixture
-def folder(tmp_path, estimated):
-    return shutil.copytree(estimated, tmp_path, dirs_exist_ok=True)
-
-
 @pytest.mark.slow
-def test_any_number_of_workers_gives_the_same_files(folder):
+def test_any_number_of_workers_gives_the_same_files(maps):
+    assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=maps).status == 0
     for jobs in ("1", "2"):
-        rollcli("derotate", "maps", "--from", "rolls.csv", "-o", f"out{jobs}", "-j", jobs, cwd=folder)
-    assert contents(folder / "out1") == contents(folder / "out2")
+        rollcli("derotate", "maps", "--from", "rolls.csv", "-o", f"out{jobs}", "-j", jobs, cwd=maps)
+    assert contents(maps / "out1") == contents(maps / "out2")
 
 
 @pytest.mark.parametrize("more", [(), ("--expand",)])
@@ -104,18 +89,13 @@ def test_the_matrix_says_where_each_pixel_has_gone(tmp_path, more):
     assert "about its centre, (80, 60)" in (tmp_path / "out" / "a.txt").read_text()
 
 
-def test_an_interrupted_run_says_that_what_is_written_is_whole(folder, monkeypatch):
-    assert rollcli("derotate", "maps", "--roll", "2", "-o", "whole", cwd=folder).status == 0
-
-    def interrupted(*arguments, **told):
-        signal.raise_signal(signal.SIGINT)
-        return do_frame(*arguments, **told)
-
-    monkeypatch.setattr(frame_work, "do_frame", interrupted)
-    done = rollcli("derotate", "maps", "--roll", "2", "-o", "out", cwd=folder)
+def test_an_interrupted_run_says_that_what_is_written_is_whole(maps, monkeypatch):
+    assert rollcli("derotate", "maps", "--roll", "2", "-o", "whole", cwd=maps).status == 0
+    interrupt_in(monkeypatch, frame_work, "do_frame")
+    done = rollcli("derotate", "maps", "--roll", "2", "-o", "out", cwd=maps)
     assert done.status == 130
     assert "interrupted; what is written is whole, and --overwrite starts anew" in done.err
-    assert contents(folder / "out") == {"frame0.png": contents(folder / "whole")["frame0.png"]}
+    assert contents(maps / "out") == {"frame0.png": contents(maps / "whole")["frame0.png"]}
 
 
 def test_a_map_whose_pixels_are_not_square_is_turned_by_the_images_angle(tmp_path):

@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import signal
 from functools import partial
 from pathlib import Path
 
@@ -12,10 +11,18 @@ from rollcli.errors import OutputError, UsageError
 from rollcli.files.results import format_header, read_result
 from rollcli.files.storage import read_bytes, remove, write_bytes
 from rollcli.run import frame_work, parts, result_file
-from rollcli.run.frame_work import do_frame
 from rollcli.run.result_file import open_result
 from tests.object_store import objects_below
-from tests.run_cli import contents, road_map, rollcli, started, wait_until, write_kitti, write_maps
+from tests.run_cli import (
+    contents,
+    interrupt_in,
+    road_map,
+    rollcli,
+    started,
+    wait_until,
+    write_kitti,
+    write_maps,
+)
 
 FRAMES = 12
 
@@ -92,13 +99,8 @@ def test_a_retry_that_is_interrupted_keeps_what_it_has_done_and_is_taken_up_agai
     line = ("estimate", "maps", "-o", "rolls.csv", "--derotated", "up")
     assert rollcli(*line, cwd=folder).status == 3
     mend(folder, maps, *BROKEN)
-
-    def interrupted(frame, options):
-        signal.raise_signal(signal.SIGINT)
-        return do_frame(frame, options)
-
     with monkeypatch.context() as patch:
-        patch.setattr(frame_work, "do_frame", interrupted)
+        interrupt_in(patch, frame_work, "do_frame")
         done = rollcli(*line, *RETRY, cwd=folder)
     assert done.status == 130
     assert "interrupted; continue with: rollcli estimate maps" in done.err
