@@ -16,6 +16,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+import pytest
 
 from tests.in_process import Finished, run_here
 
@@ -124,6 +125,13 @@ with atomic_file(sys.argv[1]) as file:
 def leave_half(path: Path) -> None:
     """Leave what a process leaves that is killed while it writes this file."""
     subprocess.run([sys.executable, "-c", _HALF, path], check=False)
+
+
+def error_of(kind: type[Exception], call: Callable[..., Any], *arguments: Any) -> str:
+    """What the error of this kind says that a call must end with."""
+    with pytest.raises(kind) as caught:
+        call(*arguments)
+    return str(caught.value)
 
 
 def interrupt_in(patch: Any, module: Any, name: str) -> None:

@@ -13,7 +13,7 @@ import yaml
 
 from rollcli.errors import UsageError
 from rollcli.extras import require_extra
-from tests.run_cli import ROOT, ended, python, rollcli, write_maps
+from tests.run_cli import ROOT, ended, error_of, python, rollcli, write_maps
 
 ACTION = yaml.safe_load((ROOT / ".github" / "action" / "action.yml").read_text("utf-8"))
 SAMPLES = ROOT / "sample_data"
@@ -178,9 +178,8 @@ def test_the_container_copies_what_is_there_and_is_not_root():
 
 def test_only_the_packages_that_are_missing_are_to_be_installed(monkeypatch):
     monkeypatch.setitem(sys.modules, "plotly", None)
-    with pytest.raises(UsageError) as caught:
-        require_extra("report", "the page")
-    assert str(caught.value) == (f"the page needs the extra report: {sys.executable} -m pip install plotly")
+    said = error_of(UsageError, require_extra, "report", "the page")
+    assert said == f"the page needs the extra report: {sys.executable} -m pip install plotly"
 
 
 def test_a_program_that_pipx_installed_is_extended_by_pipx(monkeypatch, tmp_path):

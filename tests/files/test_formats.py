@@ -39,8 +39,6 @@ def test_paths_that_are_no_files_are_named(tmp_path):
         (tmp_path / "none.png", "no such file"),
         (dangling, "is a link to nothing"),
         (loop, "cannot be read"),
-        (tmp_path / ("x" * 300), "cannot be read"),
-        ("a\0b.png", "cannot be read"),
     ):
         with pytest.raises(InputError, match=reason):
             read_bytes(path)

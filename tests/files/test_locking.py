@@ -11,6 +11,7 @@ import pytest
 
 from rollcli.errors import OutputError, UsageError
 from rollcli.files import locking
+from tests.run_cli import error_of
 
 fcntl = pytest.importorskip("fcntl", reason="this system has no flock")
 
@@ -55,9 +56,7 @@ def test_the_lock_file_of_a_killed_run_is_left_for_the_user_to_remove(result, wi
     left = Path(f"{name}.lock")
     left.touch()
 
-    with pytest.raises(UsageError) as caught, locking.locked(descriptor, name):
-        pass
-    assert str(caught.value) == (
+    assert error_of(UsageError, locking.locked(descriptor, name).__enter__) == (
         f"{name}: another run is writing this result; if none is, one was killed: remove {left}"
     )
 
@@ -118,9 +117,8 @@ def test_a_lock_is_waited_for_as_long_as_the_workers_of_a_killed_run_take_to_end
 def test_a_lock_file_that_cannot_be_made_is_named(tmp_path, without_locks, result):
     descriptor, _ = result
     name = str(tmp_path / "none" / "rolls.csv")
-    with pytest.raises(OutputError) as caught, locking.locked(descriptor, name):
-        pass
-    assert str(caught.value) == f"{name}.lock: cannot be written: no such file or directory"
+    said = error_of(OutputError, locking.locked(descriptor, name).__enter__)
+    assert said == f"{name}.lock: cannot be written: no such file or directory"
 
 
 def test_only_a_regular_file_that_nobody_writes_is_abandoned(tmp_path):

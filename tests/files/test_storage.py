@@ -10,6 +10,7 @@ from rollcli.files import storage
 from rollcli.files.search import objects_behind
 from rollcli.files.stores.locations import is_url
 from rollcli.files.stores.objects import list_objects
+from tests.run_cli import error_of
 
 
 @pytest.fixture(params=["local", "s3"])
@@ -160,9 +161,8 @@ def test_what_keeps_a_place_from_being_written_or_read_is_said_beforehand(bucket
     [("x" * 300, "cannot be read: file name too long"), ("a\0b.png", "cannot be read: .*embedded null .*")],
 )
 def test_what_the_system_objects_to_is_said_in_its_words(path, reason):
-    with pytest.raises(InputError) as caught:
-        storage.read_bytes(path, "map.png")
-    assert re.fullmatch(f"map.png: {reason}", str(caught.value))  # Pythons word the latter their own way
+    # Pythons word the latter their own way
+    assert re.fullmatch(f"map.png: {reason}", error_of(InputError, storage.read_bytes, path, "map.png"))
 
 
 @pytest.mark.parametrize("seconds", ["0", "-1", "nan", "1e6", "x"])

@@ -5,15 +5,13 @@ from dataclasses import asdict, replace
 from functools import partial
 
 import numpy as np
-import pytest
 
-from rollcli.errors import RollcliError
 from rollcli.rig.quantities import ALIGNMENT
 from rollcli.run.options import GateOptions
 from rollcli.run.rig_gates import Check, check_options, run_checks, status_of
 from rollcli.run.rig_text import Findings, as_csv, as_json, as_table
 from tests import sessions
-from tests.recorded import recorded_test
+from tests.recorded import made, recorded_test
 from tests.run.rigs import UNKNOWN, known, rig, sequence, short
 
 
@@ -128,12 +126,6 @@ def _gate(make, asked, missing="", change=None):
     return [[asdict(each) for each in checks], int(status_of(checks))]
 
 
-def _refusal(asked):
-    with pytest.raises(RollcliError) as caught:
-        check_options(GateOptions(**asked))
-    return str(caught.value)
-
-
 def _told(write):
     """A rig's assessment as a text; of many drives, one with nothing to say, and none."""
     made = Findings(_drives(), CHECKS, rig(("c", {"roll": sequence(7, known(0.0, 0.1), used=6)})), CHANGES)
@@ -186,7 +178,7 @@ CASES = {
         f"half, {asked}": partial(_gate, STILL, asked, missing="half is missing")
         for asked in ({}, {"min_ok": 1.0})
     },
-    **{f"refused: {each}": partial(_refusal, each) for each in WRONG},
+    **{f"refused: {each}": partial(made, check_options, GateOptions(**each)) for each in WRONG},
     **{f"as {name}": partial(_told, write) for name, write in TOLD.items()},
 }
 

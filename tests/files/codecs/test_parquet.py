@@ -8,7 +8,7 @@ import pytest
 from rollcli.errors import InputError, UsageError
 from rollcli.files.results import Row, column_types, decode_parquet, encode_parquet, plain_values
 from tests.fuzz.mutations import every_region
-from tests.run_cli import rollcli
+from tests.run_cli import error_of, rollcli
 
 pyarrow = pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -23,9 +23,7 @@ def written(**columns):
 
 
 def refusal(data):
-    with pytest.raises(InputError) as caught:
-        list(decode_parquet(data, "x"))
-    return str(caught.value)
+    return error_of(InputError, list, decode_parquet(data, "x"))
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ from rollcli.errors import InputError
 from rollcli.files.codecs.pictures import decode_picture
 from rollcli.files.formats import decode_stored
 from tests.binary_files import disparity_map, make_npy
+from tests.run_cli import error_of
 
 REAL = ("u1", "u2", "u4", "u8", "i1", "i2", "i4", "i8", "f2", "f4", "f8", "g")
 
@@ -51,9 +52,7 @@ def rows_of(pixels, bits):
 
 
 def refusal(data):
-    with pytest.raises(InputError) as caught:
-        decode_picture(data, "x")
-    return str(caught.value)
+    return error_of(InputError, decode_picture, data, "x")
 
 
 @pytest.mark.parametrize("size", [40, 108, 124])

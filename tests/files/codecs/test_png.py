@@ -11,6 +11,7 @@ from rollcli.files.codecs import png
 from rollcli.files.codecs.png import picture
 from rollcli.files.formats import decode_stored
 from tests.binary_files import disparity_map, flipped, make_png, png_file, png_header, png_rows
+from tests.run_cli import error_of
 
 
 def values_of(depth, height=37, width=53):
@@ -126,9 +127,7 @@ def test_interlaced_images_of_any_size_are_read(depth):
 
 
 def refusal(*chunks):
-    with pytest.raises(InputError) as caught:
-        picture(png_file(*chunks), "x")
-    return str(caught.value)
+    return error_of(InputError, picture, png_file(*chunks), "x")
 
 
 @pytest.mark.parametrize("colour", range(9))

@@ -23,6 +23,7 @@ from tests.object_store import joined, objects_below, upload
 from tests.run_cli import (
     contents,
     environment,
+    error_of,
     road_map,
     rollcli,
     started,
@@ -371,17 +372,14 @@ def test_a_scheduler_file_that_is_not_there_or_is_none_is_refused(tmp_path, cont
     file = tmp_path / "scheduler.json"
     if content is not None:
         file.write_bytes(content)
-    with pytest.raises(UsageError) as caught:
-        check_scheduler(str(file))
-    assert str(caught.value) == f"--scheduler {file}: {said}"
+    assert error_of(UsageError, check_scheduler, str(file)) == f"--scheduler {file}: {said}"
 
 
 def test_without_the_extra_it_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(UsageError) as caught:
-        check_scheduler("tcp://far:1")
-    assert str(caught.value).startswith("--scheduler needs the extra cluster: ")
-    assert str(caught.value).endswith(" -m pip install distributed")
+    said = error_of(UsageError, check_scheduler, "tcp://far:1")
+    assert said.startswith("--scheduler needs the extra cluster: ")
+    assert said.endswith(" -m pip install distributed")
 
 
 def certificate(folder, name):
