@@ -2,7 +2,7 @@
 
 import contextlib
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -17,14 +17,20 @@ def response(status: int, data: bytes = b"", length: int | None = None) -> bytes
 
 
 @contextlib.contextmanager
-def web_server(answer: Callable[[str], bytes]) -> Iterator[tuple[str, list[str]]]:
-    """Start a server that answers what it is asked for; yield its address, and what it was asked for."""
+def web_server(answer: Callable[[str], bytes | Iterable[bytes]]) -> Iterator[tuple[str, list[str]]]:
+    """Start a server that answers what it is asked for; yield its address, and what it was asked for.
+
+    An answer of several pieces is sent piece by piece, to its end or until nobody reads it any more.
+    """
     asked = []
 
     class Handler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
             asked.append(self.path)
-            self.wfile.write(answer(self.path))
+            given = answer(self.path)
+            with contextlib.suppress(ConnectionError):
+                for piece in [given] if isinstance(given, bytes) else given:
+                    self.wfile.write(piece)
 
     with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
         threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()

@@ -1,11 +1,8 @@
 """What is read is bounded before it is read: in bytes, and in time where a server gives it."""
 
-import contextlib
 import io
 import os
-import socket
 import sys
-import threading
 import time
 import urllib.request
 from pathlib import Path
@@ -18,6 +15,7 @@ from rollcli.files.bounded import read_given
 from rollcli.files.storage import read_bytes
 from tests.binary_files import npy_header
 from tests.run_cli import command, ended, environment, write_maps
+from tests.web_server import web_server
 
 pytestmark = pytest.mark.slow
 
@@ -122,38 +120,12 @@ def test_what_has_an_end_is_read_whatever_it_is(tmp_path):
             read_given("/dev/zero")
 
 
-@contextlib.contextmanager
-def served(answer):
-    """A server that answers each request with what `answer` sends."""
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        asked = []
-
-        def serve():
-            with contextlib.suppress(OSError):
-                while True:
-                    client, _ = server.accept()
-                    asked.append(client)
-                    threading.Thread(target=talk, args=(client,), daemon=True).start()
-
-        def talk(client):
-            with contextlib.suppress(OSError), client:
-                client.recv(65536)
-                answer(client)
-
-        threading.Thread(target=serve, daemon=True).start()
-        yield f"http://127.0.0.1:{server.getsockname()[1]}/map.png", asked
-
-
 def endless(start, piece=b"x" * 2**20, pause_s=0.0):
     """An answer that begins so, and gives another piece as long as it is asked."""
-
-    def answer(client):
-        client.sendall(start)
-        while True:
-            client.sendall(piece)
-            time.sleep(pause_s)
-
-    return answer
+    yield start
+    while True:
+        yield piece
+        time.sleep(pause_s)
 
 
 @pytest.mark.parametrize(
@@ -166,22 +138,22 @@ def endless(start, piece=b"x" * 2**20, pause_s=0.0):
 )
 def test_a_server_that_never_ends_is_left_after_the_time_for_the_whole(monkeypatch, start):
     monkeypatch.setenv("ROLLCLI_STORE_TIMEOUT", "1")
-    with served(endless(b"HTTP/1.1 200 OK\r\n" + start, b"x", 0.1)) as (url, asked):
+    with web_server(lambda _: endless(b"HTTP/1.1 200 OK\r\n" + start, b"x", 0.1)) as (url, asked):
         began = time.monotonic()
         with pytest.raises(
             InputError, match=r"too long; ROLLCLI_STORE_TIMEOUT sets the seconds .*\(1\), for up to 1 GB$"
         ):
-            read_bytes(url)
+            read_bytes(f"{url}/map.png")
         assert time.monotonic() - began < 3
         assert len(asked) == 1
 
 
 def test_a_server_that_gives_ever_more_is_left_after_the_bytes_that_are_read():
-    with served(endless(b"HTTP/1.1 200 OK\r\n\r\n")) as (url, asked):
+    with web_server(lambda _: endless(b"HTTP/1.1 200 OK\r\n\r\n")) as (url, asked):
         with pytest.raises(
             InputError, match=r"has more than 10000000 bytes; up to 9 MB are read, within 60 s \("
         ):
-            read_bytes(url, most=10**7)
+            read_bytes(f"{url}/map.png", most=10**7)
         assert len(asked) == 1
 
 
@@ -189,11 +161,11 @@ def test_a_large_object_is_refused_by_what_its_server_says_of_it(monkeypatch):
     size = 100 * GIB
     head = f'HTTP/1.1 200 OK\r\nContent-Length: {size}\r\nETag: "a"\r\n'
     head += "Last-Modified: Mon, 01 Jan 2024 00:00:00 GMT\r\n\r\n"
-    with served(endless(head.encode())) as (url, _):
+    with web_server(lambda _: endless(head.encode())) as (url, _):
         with pytest.raises(InputError, match=f"has {size} bytes; up to 1 GB are read, within 60 s"):
-            read_bytes(url)
+            read_bytes(f"{url}/map.png")
         pytest.importorskip("obstore", reason="obstore, of the extra storage, is not here")
-        monkeypatch.setenv("AWS_ENDPOINT_URL", url.removesuffix("/map.png"))
+        monkeypatch.setenv("AWS_ENDPOINT_URL", url)
         for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
             monkeypatch.setenv(name, "a")
         with pytest.raises(InputError, match=f"has {size} bytes; up to 1 GB are read, within 60 s"):
@@ -206,11 +178,9 @@ def test_a_large_object_is_refused_by_what_its_server_says_of_it(monkeypatch):
 def test_a_redirect_leads_to_the_web_alone(monkeypatch, place, said):
     monkeypatch.setattr(urllib.request.FTPHandler, "ftp_open", lambda *_: io.BytesIO(b"data"))
 
-    def answer(client):
-        client.sendall(f"HTTP/1.1 302 Found\r\nLocation: {place}\r\nContent-Length: 0\r\n\r\n".encode())
-
-    with served(answer) as (url, _), pytest.raises(InputError, match=said):
-        read_bytes(url)
+    found = f"HTTP/1.1 302 Found\r\nLocation: {place}\r\nContent-Length: 0\r\n\r\n".encode()
+    with web_server(lambda _: found) as (url, _), pytest.raises(InputError, match=said):
+        read_bytes(f"{url}/map.png")
 
 
 def test_a_list_of_line_ends_takes_no_memory_of_their_number(tmp_path):

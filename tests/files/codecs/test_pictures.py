@@ -110,10 +110,5 @@ def test_a_closed_terminal_is_no_trouble():
 
 
 def test_what_goes_wrong_inside_comes_out():
-    caught = None
-    try:
-        with decoding():
-            raise ValueError("inside")
-    except ValueError as error:
-        caught = error
-    assert str(caught) == "inside"
+    with pytest.raises(ValueError, match=r"^inside$"), decoding():
+        raise ValueError("inside")
