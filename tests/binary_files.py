@@ -5,6 +5,7 @@ import struct
 import zlib
 
 import numpy as np
+import tifffile
 
 ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
 COMPRESSIONS = {"none": 1, "lzw": 5, "deflate": 8, "old-deflate": 32946, "packbits": 32773}
@@ -71,9 +72,10 @@ def make_png(pixels, depth=16, colour=0, interlace=False, palette=None, extra=()
 
 def lzw_encode(data):
     """LZW as TIFF has it: most significant bit first, codes of 9 to 12 bits."""
-    bits, table, width, following = [], {bytes([i]): i for i in range(256)}, 9, 258
+    bits, table, following = [], {bytes([i]): i for i in range(256)}, 258
 
     def emit(code):
+        width = 9 + (following > 511) + (following > 1023) + (following > 2047)
         bits.append(format(code, f"0{width}b"))
 
     emit(256)
@@ -86,15 +88,13 @@ def lzw_encode(data):
         emit(table[current])
         table[longer] = following
         following += 1
-        width = 9 + (following > 511) + (following > 1023) + (following > 2047)
         if following == 4095:
             emit(256)
-            table, width, following = {bytes([i]): i for i in range(256)}, 9, 258
+            table, following = {bytes([i]): i for i in range(256)}, 258
         current = bytes([value])
     if current:
         emit(table[current])
         following += 1
-        width = 9 + (following > 511) + (following > 1023) + (following > 2047)
     emit(257)
     text = "".join(bits)
     text += "0" * (-len(text) % 8)
@@ -241,13 +241,25 @@ def tiff_of_bits(packed, compression, bits=1, **layout):
     return with_fields(whole, {256: (width, width * 8 // bits), 258: (8, bits)})
 
 
-# -- NPY and PFM
+def tiff_by_tifffile(values, **options):
+    return _written(tifffile.imwrite, values, metadata=None, **options)
+
+
+# -- NPY, NPZ and PFM
+
+
+def _written(write, *values, **options):
+    file = io.BytesIO()
+    write(file, *values, **options)
+    return file.getvalue()
 
 
 def make_npy(values, **options):
-    file = io.BytesIO()
-    np.lib.format.write_array(file, values, **options)
-    return file.getvalue()
+    return _written(np.lib.format.write_array, values, **options)
+
+
+def make_npz(save=np.savez_compressed, **arrays):
+    return _written(save, **arrays)
 
 
 def npy_header(text, version=1):

@@ -15,7 +15,7 @@ from rollcli import read_disparity
 from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files.formats import decode_stored, encode_stored
 from rollcli.files.storage import read_bytes
-from tests.binary_files import disparity_map, make_npy, make_png, make_tiff, png_file
+from tests.binary_files import disparity_map, make_npy, make_npz, make_png, make_tiff, png_file
 from tests.files.codecs.test_png import NOISY, WRONG
 from tests.run_cli import python, road_map, rollcli
 
@@ -102,32 +102,30 @@ def test_nothing_is_printed_about_damaged_files(tmp_path):
     assert done.stdout.count("refused") > 80
 
 
-def npz(**arrays):
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, **arrays)
-    return buffer.getvalue()
-
-
 def test_an_npz_holds_one_array_or_one_of_the_name_disparity():
     values = disparity_map().astype(np.float32)
-    for data in (npz(anything=values), npz(other=values[:2], disparity=values), encode_stored(values, "npz")):
+    for data in (
+        make_npz(anything=values),
+        make_npz(other=values[:2], disparity=values),
+        encode_stored(values, "npz"),
+    ):
         stored = decode_stored(data, "map")
         assert stored.format == "npz"
         np.testing.assert_array_equal(stored.values, values)
     with pytest.raises(InputError, match="one array, or one of the name disparity; here: a, b"):
-        decode_stored(npz(a=values, b=values), "map")
+        decode_stored(make_npz(a=values, b=values), "map")
 
 
 def test_broken_and_hostile_npz_files_are_refused():
     values = disparity_map().astype(np.float32)
-    whole = npz(disparity=values)
+    whole = make_npz(disparity=values)
     for end in range(4, len(whole), 97):
         with pytest.raises(InputError, match="map: "):
             decode_stored(whole[:end], "map")
     with pytest.raises(InputError, match="more than 32 MB once unpacked"):
-        decode_stored(npz(disparity=np.zeros((3000, 3000), np.float32)), "map")
+        decode_stored(make_npz(disparity=np.zeros((3000, 3000), np.float32)), "map")
     with pytest.raises(InputError, match="pickle, which is never loaded"):
-        decode_stored(npz(disparity=np.array([{}])), "map")
+        decode_stored(make_npz(disparity=np.array([{}])), "map")
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as file:
         file.writestr("a.npy", b"no array")

@@ -12,7 +12,6 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-import tifffile
 
 from rollcli.errors import RollcliError
 from rollcli.files import bounded, containers, encodings, locking, naming
@@ -31,7 +30,7 @@ from rollcli.files.results import (
 from rollcli.files.search import IMAGE_ENDINGS, Search
 from rollcli.files.stores import locations
 from rollcli.rig.calibration import Calibration
-from tests.binary_files import disparity_map, npy_header
+from tests.binary_files import disparity_map, npy_header, tiff_by_tifffile
 from tests.files.recordings import small_bags
 from tests.files.stores import answers
 from tests.fuzz.corpus import corpus
@@ -253,9 +252,7 @@ def _member(location, most):
 
 
 def _tiff(**layout):
-    file = io.BytesIO()
-    tifffile.imwrite(file, disparity_map().astype(np.float32), metadata=None, **layout)
-    return _map(file.getvalue())
+    return _map(tiff_by_tifffile(disparity_map().astype(np.float32), **layout))
 
 
 CASES = {

@@ -1,13 +1,12 @@
 """Whole files of each readable format and kind, small enough to reach every byte of them."""
 
-import io
 import zlib
 from collections.abc import Iterable
 
 import cv2
 import numpy as np
 
-from tests.binary_files import disparity_map, make_npy, make_pfm, make_png, make_tiff
+from tests.binary_files import disparity_map, make_npy, make_npz, make_pfm, make_png, make_tiff
 
 MAP = disparity_map(11, 17)
 READERS = {
@@ -38,7 +37,7 @@ def corpus(readers: Iterable[str] = READERS) -> dict[str, bytes]:
         "f4.npy": make_npy(real),
         "u2.npy": make_npy(np.asfortranarray(deep.astype(">u2"))),
         "version2.npy": make_npy(MAP, version=(2, 0)),
-        "archive.npz": _npz(real),
+        "archive.npz": make_npz(np.savez, disparity=real),
         "little.pfm": make_pfm(real),
         "big.pfm": make_pfm(real, "Pf\n# made by hand\n{width} {height}\n{scale}\n", scale="1.0"),
         "picture.jpg": cv2.imencode(".jpg", colour)[1].tobytes(),
@@ -56,12 +55,6 @@ def corpus(readers: Iterable[str] = READERS) -> dict[str, bytes]:
     files["colour.tif"] = make_tiff(colour, "lzw", photometric=2)
     endings = tuple(ending for reader in readers for ending in READERS.get(reader, ()))
     return {name: whole for name, whole in files.items() if name.endswith(endings)}
-
-
-def _npz(values: np.ndarray) -> bytes:
-    target = io.BytesIO()
-    np.savez(target, disparity=values)
-    return target.getvalue()
 
 
 def repaired_png(data: bytes) -> bytes:

@@ -1,18 +1,16 @@
 """TIFF files of every usual kind, layout and compression are read, with or without imagecodecs."""
 
-import io
 import re
 import struct
 from importlib.util import find_spec
 
 import numpy as np
 import pytest
-import tifffile
 
 from rollcli.errors import InputError
 from rollcli.files.codecs.tiff import picture
 from rollcli.files.formats import decode_mask, decode_stored
-from tests.binary_files import disparity_map, flipped, make_tiff, tiff_of_bits, with_fields
+from tests.binary_files import disparity_map, flipped, make_tiff, tiff_by_tifffile, tiff_of_bits, with_fields
 
 KINDS = ("u1", "u2", "i2", "f2", "f4", "f8")
 
@@ -121,12 +119,6 @@ COLOURS = np.random.default_rng(0).integers(0, 256, (20, 30, 4), dtype=np.uint8)
 VALUES = disparity_map().astype(np.uint16)
 
 
-def written(values, **options):
-    file = io.BytesIO()
-    tifffile.imwrite(file, values, metadata=None, **options)
-    return file.getvalue()
-
-
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
 @pytest.mark.parametrize(
     "layout",
@@ -144,7 +136,7 @@ def test_colours_lie_side_by_side_or_in_a_plane_each(kind, layout, planes):
     rgb = COLOURS[..., :3].astype(kind) * np.array(np.iinfo(kind).max // 255, kind)
     stored = rgb if planes == "contig" else np.moveaxis(rgb, -1, 0)
 
-    found = picture(written(stored, photometric="rgb", planarconfig=planes, **layout), "x")
+    found = picture(tiff_by_tifffile(stored, photometric="rgb", planarconfig=planes, **layout), "x")
 
     assert found.dtype == kind
     np.testing.assert_array_equal(found, rgb[..., ::-1])
@@ -167,7 +159,7 @@ def test_a_volume_is_no_map():
 
 
 def test_pixels_end_where_the_file_ends_or_the_end_is_named():
-    whole = written(VALUES)  # its pixels come last
+    whole = tiff_by_tifffile(VALUES)  # its pixels come last
     np.testing.assert_array_equal(decode_stored(whole, "x").values, VALUES)
     with pytest.raises(
         InputError, match=f"x: is truncated: its pixels end at byte {len(whole)} of {len(whole) - 1}$"
