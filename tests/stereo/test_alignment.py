@@ -207,37 +207,32 @@ def test_an_offset_that_is_given_is_not_measured(frame):
     assert match.corrected == Misalignment(offset=0.5)
 
 
+def levelled_as_told(frame, folder, lower, **told):
+    """A right view that lies so much lower, levelled as a file says that has it 1 px lower."""
+    height, width = frame.left.shape[:2]
+    lies = {"right_lower_px": 1.0, "right_clockwise_deg": 0, "right_larger_percent": 0, "right_twist_px": 0}
+    use = folder / "use.json"
+    use.write_text(json.dumps({**lies, **told, "width": width, "height": height}))
+    return match_pair(frame.left, seen_by(frame.right, lower=lower), StereoOptions(align=str(use)))
+
+
 @pytest.mark.parametrize(
     ("ci95", "lower", "offset"), [(0.2, 1.15, 1.15), (0.004, 1.15, 1.0), (0.2, 2.0, 1.0)]
 )
 def test_the_offset_is_the_pairs_own_as_far_as_the_drive_leaves_it_open(frame, tmp_path, ci95, lower, offset):
-    height, width = frame.left.shape[:2]
-    lies = {"right_lower_px": 1.0, "right_clockwise_deg": 0, "right_larger_percent": 0, "right_twist_px": 0}
-    lies |= {"right_lower_ci95_px": ci95, "width": width, "height": height}
-    (tmp_path / "use.json").write_text(json.dumps(lies))
-
-    match = match_pair(
-        frame.left, seen_by(frame.right, lower=lower), StereoOptions(align=str(tmp_path / "use.json"))
-    )
+    match = levelled_as_told(frame, tmp_path, lower, right_lower_ci95_px=ci95)
 
     assert match.corrected.offset == pytest.approx(offset, abs=0.03)
-    assert match.corrected.shifts(height, width)[1:] == pytest.approx([0] * 5, abs=1e-3)
+    assert match.corrected.shifts(*frame.left.shape[:2])[1:] == pytest.approx([0] * 5, abs=1e-3)
     assert ("as the correction says" in match.doubt) == (lower == 2)
 
 
 @pytest.mark.parametrize(("pitch_error", "doubted"), [(None, False), (0.0001, False), (0.0005, True)])
 def test_a_drive_that_does_not_tell_a_pitch_leaves_its_pairs_in_doubt(frame, tmp_path, pitch_error, doubted):
-    height, width = frame.left.shape[:2]
-    lies = {"right_lower_px": 1.0, "right_clockwise_deg": 0, "right_larger_percent": 0, "right_twist_px": 0}
     columns = {"scale": 0.0, "twist": 0.0, "pitch": 0.0, "slope_error": 0.0006}
     columns |= {} if pitch_error is None else {"pitch_error": pitch_error}
-    (tmp_path / "use.json").write_text(
-        json.dumps(lies | {"width": width, "height": height, "columns": columns})
-    )
 
-    match = match_pair(
-        frame.left, seen_by(frame.right, lower=1), StereoOptions(align=str(tmp_path / "use.json"))
-    )
+    match = levelled_as_told(frame, tmp_path, 1, columns=columns)
 
     assert ("right camera is pitched" in match.doubt) == doubted
     assert match.slope_error == 0.0006
@@ -274,12 +269,6 @@ def test_align_off_measures_nothing(frame):
 
     assert match.corrected == LEVEL
     assert match.doubt == ""
-
-
-def test_where_nothing_tells_whether_the_views_are_level_that_is_said():
-    plain = np.full((120, 400), 90, np.uint8)
-
-    assert "to tell whether the views are level" in match_pair(plain, plain, StereoOptions()).doubt
 
 
 def test_a_camera_that_is_too_far_off_is_never_corrected_without_a_word(frame):

@@ -193,6 +193,7 @@ def test_a_pair_without_texture_has_no_disparities():
 
     assert not match.disparity.any()
     assert match.end_fraction == 0
+    assert "to tell whether the views are level" in match.doubt
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (2, 3), (5, 20), (300, 10)])

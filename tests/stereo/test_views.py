@@ -77,20 +77,22 @@ def test_rows_of_an_odd_view_lie_at_even_distances(factor, shape):
         np.testing.assert_allclose(small[-50:-1], seen[-50:-1], atol=0.6)  # the last row may stand for fewer
 
 
+GREY, NOTHING = np.ones((4, 5), np.uint8), np.zeros((0, 100), np.uint8)
+ODD = (((4, 5), "i2"), ((4, 5), "f4"), ((4, 5, 4), "u1"), ((4, 5, 1), "u1"), ((4, 5, 3), "i4"))
+
+
 @pytest.mark.parametrize(
-    ("shape", "kind"),
-    [((4, 5), "i2"), ((4, 5), "f4"), ((4, 5, 4), "u1"), ((4, 5, 1), "u1"), ((4, 5, 3), "i4")],
+    ("left", "right", "said"),
+    [
+        *((np.ones(*odd), np.ones(*odd), "grey and BGR images of 8 and 16 bits can") for odd in ODD),
+        (GREY, np.ones((4, 6, 3), np.uint8), "5x4 and 6x4"),
+        (GREY, np.ones((3, 5, 3), np.uint8), "5x4 and 5x3"),
+        (NOTHING, NOTHING, "no pixels: 100x0"),
+    ],
 )
-def test_other_kinds_are_named_and_refused(shape, kind):
-    image = np.ones(shape, kind)
-    with pytest.raises(InputError, match="grey and BGR images of 8 and 16 bits can"):
-        prepare_views(image, image)
-
-
-@pytest.mark.parametrize("other", [(4, 6), (3, 5)])
-def test_views_of_two_sizes_are_refused(other):
-    with pytest.raises(InputError, match=f"5x4 and {other[1]}x{other[0]}"):
-        prepare_views(np.ones((4, 5), np.uint8), np.ones((*other, 3), np.uint8))
+def test_what_is_no_pair_of_views_is_named_and_refused(left, right, said):
+    with pytest.raises(InputError, match=said):
+        prepare_views(left, right)
 
 
 def bilinear(view, u, v):
@@ -218,9 +220,3 @@ def test_either_byte_order_of_16_bits_is_read():
     plain = prepare_views(view, view)
 
     np.testing.assert_array_equal(prepare_views(view.astype(">u2"), view.astype(">u2")), plain)
-
-
-def test_images_without_pixels_are_refused():
-    nothing = np.zeros((0, 100), np.uint8)
-    with pytest.raises(InputError, match="no pixels: 100x0"):
-        prepare_views(nothing, nothing)
