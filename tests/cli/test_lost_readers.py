@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.run_cli import command, environment, holding, started, wait_until, write_maps
+from tests.run_cli import command, ended, holding, started, wait_until, write_maps
 from tests.slow import mostly_slow
 
 FRAMES = 8
@@ -25,17 +25,13 @@ WORK = {
 }
 
 
-def start(folder, arguments, **streams):
-    return subprocess.Popen(command(*arguments), cwd=folder, env=environment(), **streams)
-
-
-def start_without_reader(folder, arguments, stream, **streams):
-    """Start the program with nobody at the other end of one of its streams."""
+def without_reader(folder, arguments, stream):
+    """Run the program with nobody at the other end of one of its streams."""
     read, write = os.pipe()
     os.close(read)
-    run = start(folder, arguments, **{stream: write}, **streams)
+    done = ended(command(*arguments), folder, timeout=60, **{stream: write})
     os.close(write)
-    return run
+    return done
 
 
 NO_DISK = pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
@@ -47,10 +43,11 @@ def test_a_reader_of_messages_who_is_lost_neither_ends_nor_hides_the_work(maps, 
     arguments, written = WORK[name]
     if reader == "full disk":
         with Path("/dev/full").open("wb") as full:
-            run = start(maps, arguments, stderr=full)
+            run = started(*arguments, cwd=maps, stderr=full)
     else:
         reads, writes = os.pipe() if reader == "pipe" else pty.openpty()
-        run = start(maps, arguments, stdout=writes if reader == "pipe" else None, stderr=writes)
+        out = writes if reader == "pipe" else None
+        run = started(*arguments, cwd=maps, stdout=out, stderr=writes)
         os.close(writes)
         os.read(reads, 1)
         os.close(reads)
@@ -64,23 +61,21 @@ def test_a_reader_of_messages_who_is_lost_neither_ends_nor_hides_the_work(maps, 
     "arguments", [["--help"], ["--versions"], ["estimate", "--help"], ["estimate", "maps", "-q"]]
 )
 def test_a_reader_of_answers_who_has_left_ends_the_program_quietly(maps, arguments):
-    run = start_without_reader(maps, arguments, "stdout", stderr=subprocess.PIPE)
-    _, err = run.communicate(timeout=60)
-    assert (run.returncode, err) == (0, b"")
+    done = without_reader(maps, arguments, "stdout")
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 @NO_DISK
-@pytest.mark.parametrize("arguments", [[], ["--version"], ["rig", "--help"]])
+@pytest.mark.parametrize("arguments", [[], ["--version"], ["rig", "--help"], ["estimate", "maps", "-q"]])
 def test_an_answer_that_meets_a_full_disk_is_told_in_words(maps, arguments):
     with Path("/dev/full").open("wb") as full:
-        run = start(maps, arguments, stdout=full, stderr=subprocess.PIPE)
-        _, err = run.communicate(timeout=60)
-    said = b"rollcli: standard output: cannot be written: no space left on device\n"
-    assert (run.returncode, err) == (1, said)
+        done = ended(command(*arguments), maps, stdout=full, timeout=60)
+    said = "rollcli: standard output: cannot be written: no space left on device\n"
+    assert (done.returncode, done.stderr) == (1, said)
 
 
 def test_an_error_keeps_its_status_when_nobody_reads_its_message(maps):
-    assert start_without_reader(maps, ["estimate", "nothing"], "stderr").wait(60) == 2
+    assert without_reader(maps, ["estimate", "nothing"], "stderr").returncode == 2
 
 
 @pytest.mark.slow
@@ -105,11 +100,11 @@ def test_a_hangup_stops_a_run_as_sigterm_does_unless_it_is_ignored(maps):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_before_the_run_is_one_line_and_status_130(maps, number):
-    run = start(maps, ["estimate", "-"], stdin=subprocess.PIPE, stderr=subprocess.PIPE)
+    run = started("estimate", "-", cwd=maps, stdin=subprocess.PIPE)
     wait_until_it_reads(run)
     run.send_signal(number)
     _, err = run.communicate(timeout=60)
-    assert (run.returncode, err) == (130, b"rollcli: interrupted\n")
+    assert (run.returncode, err) == (130, "rollcli: interrupted\n")
 
 
 def wait_until_it_reads(run):
@@ -124,21 +119,18 @@ def wait_until_it_reads(run):
 def test_file_names_neither_forge_lines_nor_command_the_terminal(tmp_path):
     name = "a\x1b[2J\x07\nrollcli: all is well\r.png"
     (tmp_path / name).write_bytes(b"no map at all")
-    run = start(tmp_path, ["estimate", ".", "-v"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-    _, err = run.communicate(timeout=60)
-    assert run.returncode == 3
-    assert not any(byte in err for byte in b"\x1b\x07\r")
-    assert b"\nrollcli: all is well" not in err
-    refused = start(tmp_path, ["estimate", f"no{name}"], stderr=subprocess.PIPE)
-    _, err = refused.communicate(timeout=60)
-    assert err.count(b"\n") == 1
-    assert b"\x1b" not in err
+    done = ended(command("estimate", ".", "-v"), tmp_path, text=False, timeout=60)
+    assert done.returncode == 3
+    assert not any(byte in done.stderr for byte in b"\x1b\x07\r")
+    assert b"\nrollcli: all is well" not in done.stderr
+    refused = ended(command("estimate", f"no{name}"), tmp_path, text=False, timeout=60)
+    assert refused.stderr.count(b"\n") == 1
+    assert b"\x1b" not in refused.stderr
 
 
 def test_a_terminal_sees_a_progress_bar(maps):
     main, other = pty.openpty()
-    line = command("estimate", "maps", "-o", "rolls.csv")
-    with subprocess.Popen(line, cwd=maps, env=environment(), stdout=other, stderr=other) as run:
+    with started("estimate", "maps", "-o", "rolls.csv", cwd=maps, stdout=other, stderr=other) as run:
         os.close(other)
         shown = b""
         while chunk := read(main):

@@ -48,14 +48,6 @@ def test_a_full_device_ends_the_run_with_status_1(maps, jobs):
     assert "/dev/full: cannot be written: no space left on device" in one_line(done)
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
-def test_a_full_standard_output_ends_the_run_with_status_1(maps):
-    with Path("/dev/full").open("wb") as full:
-        done = ended(command("estimate", "maps", "-q"), maps, stdout=full)
-    assert done.returncode == 1
-    assert done.stderr == "rollcli: standard output: cannot be written: no space left on device\n"
-
-
 @pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
 def test_a_result_that_may_not_grow_keeps_its_whole_rows_and_is_resumed_later(maps, jobs):
     write_maps(maps / "maps", 40)
