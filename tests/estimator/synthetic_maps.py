@@ -1,7 +1,6 @@
 """Disparity maps whose roll is known, or that have none."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 from hypothesis import settings
@@ -9,8 +8,6 @@ from hypothesis import strategies as st
 
 from rollcli.estimator.energy import Energy, Terms
 from rollcli.estimator.moments import map_moments
-
-ROADS = Path(__file__).resolve().parents[3] / "shared" / "roads"
 
 # the same examples each time, however busy the machine
 repeatable = settings(derandomize=True, max_examples=60, database=None)

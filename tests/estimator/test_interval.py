@@ -3,7 +3,6 @@
 import csv
 import dataclasses
 import math
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -22,9 +21,9 @@ from rollcli.estimator.tuning import TUNING, IntervalTuning
 from rollcli.simulate.dataset import lane_rolls_of
 from rollcli.simulate.spec import FrameSpec
 from tests.estimator.synthetic_maps import bent_road, energy_of, flat_road
+from tests.real_pairs import LIDAR, needs_lidar
 from tests.true_disparity import true_disparity
 
-SWEEPS = Path(__file__).parents[2].parent / "shared" / "lidar" / "sweep"
 SIZE = {"width": 320, "height": 240, "focal": 280.0}
 
 
@@ -79,11 +78,11 @@ def test_on_rough_roads_they_hold_the_roll_of_the_lane_that_a_lidar_would_say():
     assert np.mean(held) >= 0.95 - 3 * math.sqrt(0.95 * 0.05 / 28)
 
 
-@pytest.mark.skipif(not SWEEPS.is_dir(), reason="no lidar sweeps at ../shared/lidar")
+@needs_lidar
 def test_where_the_nearest_road_is_hidden_they_hold_the_roll_of_the_lane_from_the_rig_on():
-    reference, held = SWEEPS.parent / "reference.csv", []
+    reference, held = LIDAR / "reference.csv", []
     for row in csv.DictReader(reference.read_text().splitlines()):
-        sweep = read_disparity(SWEEPS / f"{row['frame']}.png")
+        sweep = read_disparity(LIDAR / "sweep" / f"{row['frame']}.png")
         for hidden in (45, 75):
             sweep[-hidden:] = 0
             found = estimate_roll(sweep)

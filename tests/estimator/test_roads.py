@@ -10,14 +10,14 @@ from rollcli.estimator.request import Request
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.files.formats import read_image
 from rollcli.stereo.match import StereoOptions, match_pair
-from tests.estimator.synthetic_maps import ROADS, energy_of
+from tests.estimator.synthetic_maps import energy_of
+from tests.real_pairs import ROADS, ROLL_DEG, needs_roads
 
-ROLL_DEG = {"m1_L1": -3.47, "m1_L5": -1.62, "m2_L9": -2.54, "m2_L18": -4.30, "m3_L3": 2.36}
 HALF_SIZE = StereoOptions(num_disparities=256, block_size=5, mode="3way", downscale=2)
 DELTAS = [math.pi / k for k in (1.8e3, 1.8e4, 1.8e5, 1.8e6)]
 PAPER = [3, 4, 4, 4]  # [GD] Table I, iterations of gradient descent
 
-pytestmark = pytest.mark.skipif(not ROADS.is_dir(), reason=f"the real road pairs are not at {ROADS}")
+pytestmark = needs_roads
 
 
 @functools.cache

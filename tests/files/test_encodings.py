@@ -1,13 +1,12 @@
 """Stored numbers become pixels, and no data becomes 0, whatever a file calls it and a plateau shows."""
 
-from pathlib import Path
-
 import cv2
 import numpy as np
 import pytest
 
 from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import Stored, read_stored
+from tests.real_pairs import REALMAPS, needs_maps
 from tests.run_cli import rollcli, rows_of
 
 
@@ -20,7 +19,6 @@ def test_the_stored_numbers_are_left_alone():
     assert values.tolist() == [[65535, -1, 5]]
 
 
-REALMAPS = Path(__file__).parents[2].parent / "shared" / "realmaps"
 TRUTHS = {"frame_0001": -8.0, "frame_0003": 12.0, "frame_0004": -4.0}
 
 
@@ -52,7 +50,7 @@ def test_the_mark_of_opencv_is_no_data_whatever_its_range_begins_with(tmp_path, 
     assert "taken as no data" in done.err
 
 
-@pytest.mark.skipif(not REALMAPS.is_dir(), reason="needs the real maps beside the project")
+@needs_maps
 @pytest.mark.parametrize("kind", ["network", "post", "raw", "refined", "sgm"])
 def test_no_real_map_has_such_a_plateau(kind):
     files = sorted((REALMAPS / kind).glob("*.png"))

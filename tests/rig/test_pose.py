@@ -11,7 +11,7 @@ from rollcli.estimator.interval import Tangent
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import pose_of, with_pose
 from rollcli.stereo.match import StereoOptions, match_pair
-from tests.run_cli import ROOT
+from tests.real_pairs import STREETS, needs_streets
 
 WIDTH, HEIGHT = 320, 200
 
@@ -121,11 +121,8 @@ def test_on_a_bent_road_the_pose_is_that_over_the_road_where_the_tangent_touches
     assert posed.height_m == pytest.approx(over, rel=3e-3)
 
 
-STREETS = ROOT.parent / "shared" / "streets"
 KITTIS = Calibration(707.0912, 707.0912, 601.8873, 183.1104, 0.5372)
 RUNS = {"000074": (9, 10, 11), "000151": (7, 8), "000174": (10, 11)}
-
-needs_streets = pytest.mark.skipif(not STREETS.is_dir(), reason=f"{STREETS}, the real streets, are not here")
 
 
 def posed_street(name, downscale=1.0):

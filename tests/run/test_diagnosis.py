@@ -8,11 +8,11 @@ from rollcli.files.encodings import read_disparity, to_disparity
 from rollcli.files.formats import Stored, read_stored
 from rollcli.run.diagnosis import looks_like, require_positive
 from rollcli.run.options import FrameOptions
+from tests.real_pairs import REALMAPS, STREETS
 from tests.run_cli import ROOT, road_map
 
 SAMPLES = sorted((ROOT / "sample_data" / "maps").iterdir())
 PHOTOGRAPHS = sorted((ROOT / "sample_data").glob("[lr]*t/*.png"))
-SHARED = ROOT.parent / "shared"
 PHOTOGRAPH, DEPTH, UPSIDE_DOWN = "looks like a photograph", "looks like a depth map", "upside down"
 
 
@@ -51,10 +51,10 @@ def test_noise_walls_and_small_maps_are_taken_for_nothing():
 
 def test_real_maps_and_photographs_are_told_apart():
     folders = ("raw", "refined", "sgm", "post", "network")
-    maps = [str(path) for each in folders for path in sorted(SHARED.glob(f"realmaps/{each}/*.png"))[3::8]]
-    photographs = [str(path) for path in sorted(SHARED.glob("streets/left/*.png"))[::4]]
+    maps = [str(path) for each in folders for path in sorted(REALMAPS.glob(f"{each}/*.png"))[3::8]]
+    photographs = [str(path) for path in sorted(STREETS.glob("left/*.png"))[::4]]
     if not (maps and photographs):
-        pytest.skip(f"the real maps and photographs are not there: {SHARED}")
+        pytest.skip(f"the real maps and photographs are not there: {REALMAPS}, {STREETS}")
     assert [path for path in maps if verdict(cv2.imread(path, cv2.IMREAD_UNCHANGED))] == []
     assert all(PHOTOGRAPH in verdict(cv2.imread(path, cv2.IMREAD_GRAYSCALE)) for path in photographs)
 

@@ -7,9 +7,8 @@ import pytest
 
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_stored
-from tests.run_cli import ROOT, contents, rollcli
-
-ROADS = ROOT.parent / "shared" / "roads"
+from tests.real_pairs import ROADS, needs_roads
+from tests.run_cli import contents, rollcli
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +38,7 @@ def test_each_pair_gives_a_kitti_map_named_after_its_left_image(pairs):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not ROADS.is_dir(), reason="the real road pairs (../shared/roads) are not here")
+@needs_roads
 def test_on_real_roads_most_pixels_of_the_matched_region_are_valid(tmp_path):
     done = match(
         tmp_path, "-o", "maps", "--downscale", "2", left=str(ROADS / "left"), right=str(ROADS / "right")

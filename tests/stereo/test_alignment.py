@@ -2,7 +2,6 @@
 
 import json
 import math
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -21,10 +20,9 @@ from rollcli.stereo.match import StereoOptions, match_pair
 from rollcli.stereo.misalignment import LEVEL, Misalignment
 from rollcli.stereo.views import resampled
 from tests.odd_views import seen_by, seen_turned
-from tests.real_pairs import needs_lidar, real_pairs
+from tests.real_pairs import STREETS, needs_lidar, needs_streets, real_pairs
 from tests.slow import mostly_slow
 
-SHARED = Path(__file__).parents[2].parent / "shared"
 ROLL = math.radians(-3)
 ODD_RIGS = [  # degrees clockwise, percent larger, pixels lower
     (0.3, 0.0, 0.0),
@@ -345,7 +343,7 @@ def test_an_offset_that_cannot_be_is_refused(offset):
         StereoOptions(vertical_offset=offset)
 
 
-@pytest.mark.skipif(not (SHARED / "streets").is_dir(), reason="no real street pairs at ../shared/streets")
+@needs_streets
 @pytest.mark.parametrize(
     ("clockwise_deg", "larger_percent", "lower"),
     mostly_slow([(0.5, 0.0, -2.0), (-0.8, 0.8, 4.0)], (0.5, 0.0, -2.0)),
@@ -353,7 +351,7 @@ def test_an_offset_that_cannot_be_is_refused(offset):
 def test_real_street_pairs_are_levelled_by_what_was_added(clockwise_deg, larger_percent, lower):
     odd = {"clockwise_deg": clockwise_deg, "larger_percent": larger_percent, "lower": lower}
     compared = 0
-    for views in pair_inputs(str(SHARED / "streets" / "left"), str(SHARED / "streets" / "right"))[::6]:
+    for views in pair_inputs(str(STREETS / "left"), str(STREETS / "right"))[::6]:
         left, right = (read_image(view.path) for view in views)
         as_it_is = match_pair(left, right, StereoOptions())
         match = match_pair(left, seen_by(right, **odd), StereoOptions())

@@ -1,7 +1,6 @@
 """Pairs are matched over a range that they show themselves."""
 
 import math
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -17,9 +16,7 @@ from rollcli.simulate.spec import FrameSpec
 from rollcli.stereo import sgbm
 from rollcli.stereo.match import StereoOptions, compute_disparity, match_pair
 from tests.odd_views import find_road, seen_by
-
-SHARED = Path(__file__).parents[2].parent / "shared"
-ROADS = {"m1_L1": -3.47, "m1_L5": -1.62, "m2_L9": -2.54, "m2_L18": -4.30, "m3_L3": 2.36}
+from tests.real_pairs import ROADS, ROLL_DEG, STREETS, needs_roads, needs_streets
 
 
 def pair_at(disparity, shape=(120, 400), seed=0):
@@ -220,9 +217,9 @@ def test_options_that_make_no_sense_are_refused(options):
         StereoOptions(**options)
 
 
-@pytest.mark.skipif(not (SHARED / "roads").is_dir(), reason="no real road pairs at ../shared/roads")
+@needs_roads
 def test_real_road_pairs_need_and_get_a_wide_range():
-    for left, right in pair_inputs(str(SHARED / "roads" / "left"), str(SHARED / "roads" / "right")):
+    for left, right in pair_inputs(str(ROADS / "left"), str(ROADS / "right")):
         match = match_pair(read_image(left.path), read_image(right.path), StereoOptions(downscale=4))
         inside = match.disparity[:, match.num_disparities :]
 
@@ -230,13 +227,13 @@ def test_real_road_pairs_need_and_get_a_wide_range():
         assert match.end_fraction < 0.001
         assert (inside > 0).mean() > 0.9
         roll_deg = math.degrees(estimate_roll(match.disparity, Request(road="all")).theta)
-        assert roll_deg == pytest.approx(ROADS[left.path.stem], abs=0.15)
+        assert roll_deg == pytest.approx(ROLL_DEG[left.path.stem], abs=0.15)
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not (SHARED / "streets").is_dir(), reason="no real street pairs at ../shared/streets")
+@needs_streets
 def test_real_street_pairs_get_a_range_that_fits():
-    for left, right in pair_inputs(str(SHARED / "streets" / "left"), str(SHARED / "streets" / "right")):
+    for left, right in pair_inputs(str(STREETS / "left"), str(STREETS / "right")):
         match = match_pair(read_image(left.path), read_image(right.path), StereoOptions(downscale=2))
 
         assert 32 <= match.num_disparities <= 112

@@ -3,7 +3,6 @@
 import functools
 import itertools
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,10 +18,8 @@ from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
 from rollcli.stereo.match import StereoOptions, match_pair
 from tests.estimator.synthetic_maps import banked_road, bent_road, flat_road
+from tests.real_pairs import STREETS, needs_streets
 from tests.true_disparity import true_disparity
-
-STREETS = Path(__file__).parents[3].parent / "shared" / "streets"
-
 
 # of the lane ahead, lowest and highest of 1 to 2.5 m to each side, 5 to 12 and 8 to 20 m away; the others
 # have a vertical offset between the views, or two planes
@@ -199,11 +196,6 @@ def test_only_pixels_of_the_mask_are_used():
 
     assert math.degrees(estimate.theta) == pytest.approx(math.degrees(0.1), abs=0.02)
     assert not (estimate.road_mask & ~road).any()
-
-
-needs_streets = pytest.mark.skipif(
-    not STREETS.is_dir(), reason="the real street pairs (../shared/streets) are not here"
-)
 
 
 @functools.cache
