@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -161,10 +161,10 @@ def keep_rows(path: Path, count: int, further: int = 0) -> bytes:
     return whole
 
 
-def contents(folder: Path) -> dict[str, bytes]:
-    """Every file below a folder, by its relative path."""
-    files = (path for path in folder.rglob("*") if path.is_file())
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+def contents(folder: Path, without: str | tuple[str, ...] = ()) -> dict[str, bytes]:
+    """Every file below a folder, by its relative path, but those whose paths begin like this."""
+    files = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*") if path.is_file()}
+    return {name: path.read_bytes() for name, path in files.items() if not name.startswith(without)}
 
 
 @contextlib.contextmanager
@@ -205,6 +205,18 @@ def write_maps(folder: Path, count: int, **size: int) -> None:
     """`count` maps frame0.png, frame1.png, ..., each rolled a little more."""
     for index in range(count):
         write_kitti(folder / f"frame{index}.png", road_map(0.01 * (index % 40), seed=index, **size))
+
+
+def estimated(
+    folder: Path, count: int, *arguments: str, broken: Mapping[int, bytes] | None = None, **size: int
+) -> Path:
+    """A folder of maps, of which some have other bytes, and what `estimate` has made of them, rolls.csv."""
+    write_maps(folder / "maps", count, **size)
+    for index, data in (broken or {}).items():
+        (folder / "maps" / f"frame{index}.png").write_bytes(data)
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", *arguments, cwd=folder)
+    assert done.status == (3 if broken else 0), done.err
+    return folder
 
 
 def write_pair(folder: Path, name: str, disparity, seed: int = 0) -> None:

@@ -4,7 +4,7 @@ import pytest
 
 from rollcli.files.storage import remove
 from tests.object_store import joined, objects_below, upload
-from tests.run_cli import contents, rollcli, write_maps
+from tests.run_cli import contents, estimated, rollcli, write_maps
 from tests.store_proxy import Faults, proxied
 
 
@@ -66,9 +66,7 @@ MAPS = 80
 def local(tmp_path_factory):
     """Maps on disk, with their rows and de-rotated images."""
     folder = tmp_path_factory.mktemp("local")
-    write_maps(folder / "maps", MAPS, width=80, height=60)
-    assert rollcli("estimate", "maps", "-o", "rolls.csv", "--derotated", "level", cwd=folder).status == 0
-    return folder
+    return estimated(folder, MAPS, "--derotated", "level", width=80, height=60)
 
 
 @pytest.mark.slow

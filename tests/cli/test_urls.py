@@ -111,10 +111,6 @@ BAD = (
 )
 
 
-def written(folder):
-    return sorted(contents(folder))
-
-
 @pytest.mark.parametrize("name", BAD)
 def test_a_url_that_names_no_file_is_that_frames_error_and_writes_nothing(tmp_path, server, name):
     cwd = tmp_path / "cwd"
@@ -126,8 +122,8 @@ def test_a_url_that_names_no_file_is_that_frames_error_and_writes_nothing(tmp_pa
     assert "names no file below a folder" in rows[maps[0]]["message"]
     assert rows[maps[1]]["status"] == "ok"
     results = ["rolls.csv", "rolls.csv.inputs", "rolls.csv.run.json"]
-    assert written(cwd) == [*results, "up/good.png", "v/good.png"]
-    assert written(tmp_path / "map") == ["frame0.png"]
+    assert sorted(contents(cwd)) == [*results, "up/good.png", "v/good.png"]
+    assert sorted(contents(tmp_path / "map")) == ["frame0.png"]
 
 
 def test_a_url_that_is_no_address_is_that_frames_error(tmp_path):
@@ -155,7 +151,7 @@ def test_names_of_objects_are_checked_likewise(tmp_path, bucket, store):
         "a:b.png": "error",
         "2024-05-01T12:00:00.png": "ok",
     }
-    assert written(tmp_path / "up") == ["2024-05-01T12:00:00.png"]
+    assert sorted(contents(tmp_path / "up")) == ["2024-05-01T12:00:00.png"]
 
 
 def test_names_that_windows_gives_to_devices_and_streams_are_no_files_there(monkeypatch):

@@ -22,7 +22,7 @@ from rollcli.run.progress import Figures
 from rollcli.run.result import FileOutput
 from rollcli.run.result_file import open_result
 from rollcli.run.resume import KeptRows, RunRecord
-from tests.run_cli import contents, keep_rows, rollcli, write_maps
+from tests.run_cli import contents, estimated, keep_rows, rollcli
 from tests.slow import mostly_slow
 
 IMAGES = ("--derotated", "up", "--vdisparity", "v")
@@ -82,10 +82,7 @@ def test_a_row_is_written_after_its_images_and_their_folder_are_on_the_disk(tmp_
 
 @pytest.fixture
 def finished(tmp_path):
-    write_maps(tmp_path / "maps", 6)
-    (tmp_path / "maps" / "frame3.png").write_bytes(b"no map")
-    assert rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, cwd=tmp_path).status == 3
-    return tmp_path
+    return estimated(tmp_path, 6, *IMAGES, broken={3: b"no map"})
 
 
 def resume(folder, *arguments):

@@ -10,7 +10,7 @@ import pytest
 
 from rollcli.files.results import parse_rows
 from rollcli.run.result_file import whole_rows
-from tests.run_cli import command, contents, ended, environment, rollcli, started, wait_until, write_maps
+from tests.run_cli import command, contents, ended, environment, estimated, rollcli, started, wait_until
 from tests.slow import mostly_slow
 
 FRAMES = 40
@@ -21,10 +21,7 @@ IMAGES = ("--derotated", "upright", "--vdisparity", "v")
 def undisturbed(tmp_path_factory):
     """A folder of maps with the result and images of a run that nothing disturbed."""
     folder = tmp_path_factory.mktemp("undisturbed")
-    write_maps(folder / "maps", FRAMES, width=300, height=200)
-    (folder / "maps" / "frame7.png").write_bytes(b"no map")
-    assert rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, cwd=folder).status == 3
-    return folder
+    return estimated(folder, FRAMES, *IMAGES, broken={7: b"no map"}, width=300, height=200)
 
 
 @pytest.fixture
@@ -36,7 +33,7 @@ def folder(undisturbed, tmp_path):
 
 def results(folder):
     """Everything but the maps."""
-    return {name: data for name, data in contents(folder).items() if not name.startswith("maps/")}
+    return contents(folder, without="maps/")
 
 
 def start(folder, *arguments):

@@ -60,11 +60,6 @@ def mend(folder, maps, *indices):
         shutil.copyfile(maps / name, folder / "maps" / name)
 
 
-def made(folder):
-    """Every file that the program wrote."""
-    return {name: data for name, data in contents(folder).items() if not name.startswith("maps/")}
-
-
 def anew(folder, line):
     """Everything that a run makes of these maps, written to the same names."""
     kept = folder / "kept"
@@ -72,8 +67,7 @@ def anew(folder, line):
     for path in [each for each in folder.iterdir() if each.name not in ("maps", "kept")]:
         path.rename(kept / path.name)
     assert rollcli(*line, cwd=folder).status == 0
-    fresh = {name: data for name, data in made(folder).items() if not name.startswith("kept/")}
-    return fresh, contents(kept)
+    return contents(folder, without=("maps/", "kept/")), contents(kept)
 
 
 @pytest.mark.parametrize("result", ["rolls.csv", "rolls.jsonl", "rolls.parquet"])
@@ -231,7 +225,7 @@ def everything(place):
     """What lies in a folder or below a prefix, apart from maps, by its name."""
     if place.startswith("s3://"):
         return objects_below(place.rstrip("/"))
-    return made(Path(place))
+    return contents(Path(place), without="maps/")
 
 
 HEADER = format_header("csv")

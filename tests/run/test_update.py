@@ -7,7 +7,7 @@ import pytest
 from rollcli.files.storage import read_bytes, remove, write_bytes
 from rollcli.run import result_file
 from tests.object_store import objects_below, upload
-from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
+from tests.run_cli import contents, estimated, road_map, rollcli, write_kitti, write_maps
 from tests.slow import mostly_slow
 
 FRAMES = 8
@@ -33,7 +33,7 @@ def touch(folder, older=False):
 
 def written(folder):
     """What a run writes, but the lines of the inputs' states."""
-    return {name: data for name, data in contents(folder).items() if not name.startswith("maps")}
+    return contents(folder, without="maps")
 
 
 def inodes(folder):
@@ -43,10 +43,7 @@ def inodes(folder):
 @pytest.fixture
 def folder(tmp_path):
     """A whole result of a few maps, with an image each."""
-    write_maps(tmp_path / "maps", FRAMES)
-    (tmp_path / "maps" / "frame3.png").write_bytes(b"no map")
-    estimate(tmp_path, *IMAGES, status=3)
-    return tmp_path
+    return estimated(tmp_path, FRAMES, *IMAGES, broken={3: b"no map"})
 
 
 def anew(folder, tmp_path_factory, result):

@@ -17,7 +17,7 @@ from rollcli.run.options import FrameOptions, ResultOptions
 from rollcli.run.result_file import inputs_line
 from rollcli.run.workers.chunks import Chunks, Done, Span, Work
 from tests.object_store import joined
-from tests.run_cli import contents, rollcli, started, wait_until, write_maps
+from tests.run_cli import contents, estimated, rollcli, started, wait_until, write_maps
 from tests.slow import mostly_slow
 
 KITTI = ReadAs(frozenset(["kitti"]))
@@ -102,10 +102,7 @@ def test_chunks_are_whole_parts_or_pieces_of_one(rows, seconds):
 @pytest.fixture
 def maps(tmp_path):
     """Twenty-three maps, one of them broken, and the CSV of a run on one process."""
-    write_maps(tmp_path / "maps", 23)
-    (tmp_path / "maps" / "frame7.png").write_bytes(b"no map")
-    assert rollcli("estimate", "maps", "-o", "rolls.csv", "-j", "1", cwd=tmp_path).status == 3
-    return tmp_path
+    return estimated(tmp_path, 23, "-j", "1", broken={7: b"no map"})
 
 
 @pytest.mark.parametrize("rows", mostly_slow(["1", "2", "7", "23", "1000"], "7"))

@@ -75,10 +75,6 @@ def test_truth_appears_only_when_every_frame_is_there(tmp_path, monkeypatch):
 STEMS = [f"frame_{number:04d}" for number in range(1, len(SPECS) + 1)]
 
 
-def files(folder):
-    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
-
-
 @pytest.fixture(scope="module")
 def made(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("samples")
@@ -88,7 +84,7 @@ def made(tmp_path_factory) -> Path:
 
 @pytest.mark.slow
 def test_the_script_makes_the_same_files_and_the_same_truth(made):
-    assert files(SAMPLES) == files(made)
+    assert contents(SAMPLES).keys() == contents(made).keys()
     assert (SAMPLES / "truth.csv").read_text() == (made / "truth.csv").read_text()
 
 

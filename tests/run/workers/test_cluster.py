@@ -24,6 +24,7 @@ from tests.run_cli import (
     contents,
     environment,
     error_of,
+    estimated,
     road_map,
     rollcli,
     started,
@@ -120,10 +121,7 @@ def end(process):
 def local(tmp_path_factory):
     """Maps, one of them broken, and what a run on this machine makes of them."""
     folder = tmp_path_factory.mktemp("local")
-    write_maps(folder / "maps", FRAMES, width=300, height=200)
-    (folder / "maps" / "frame5.png").write_bytes(b"")
-    assert rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, cwd=folder).status == 3
-    return folder
+    return estimated(folder, FRAMES, *IMAGES, broken={5: b""}, width=300, height=200)
 
 
 @pytest.fixture
