@@ -1,9 +1,7 @@
-"""What a right camera sees that is turned, lower or larger, and the road's plane as `estimate` finds it."""
+"""What a right camera sees that is turned, lower or larger."""
 
 import cv2
 import numpy as np
-
-from rollcli.estimator.road.find import road_plane
 
 
 def seen_by(view, *, clockwise_deg=0.0, larger_percent=0.0, lower=0.0, border=cv2.BORDER_REFLECT):
@@ -27,8 +25,3 @@ def seen_turned(view, yaw_deg=0.0, pitch_deg=0.0, focal=0.7):
     seen = camera @ turned @ np.linalg.inv(camera)
     how = {"flags": cv2.INTER_LANCZOS4, "borderMode": cv2.BORDER_REFLECT}
     return cv2.warpPerspective(view, seen, (width, height), **how)
-
-
-def find_road(small):
-    """The plane of the road in a small map."""
-    return road_plane(small)

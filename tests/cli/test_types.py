@@ -17,9 +17,6 @@ from tests.run_cli import write_maps
 def test_a_whole_number_is_one_also_where_it_is_written_as_a_float():
     kind = Number("N", whole=True)
     assert [type(kind.convert(value, None, None)) for value in ("7", 7, 7.0)] == [int] * 3
-    assert type(Number("N").convert("7", None, None)) is float
-    with pytest.raises(click.BadParameter):
-        kind.convert("7.0", None, None)
 
 
 def test_a_table_has_the_format_given_else_that_of_its_ending():

@@ -258,16 +258,9 @@ def _hex(colour):
 
 
 def _pen(line):
-    return [
-        line.get_color(),
-        line.get_linestyle(),
-        line.get_linewidth(),
-        line.get_marker(),
-        line.get_markersize(),
-        line.get_markerfacecolor(),
-        line.get_markeredgewidth(),
-        line.get_zorder(),
-    ]
+    getp = pytest.importorskip("matplotlib.artist").getp
+    shape = ("marker", "markersize", "markerfacecolor", "markeredgewidth")
+    return [getp(line, name) for name in ("color", "linestyle", "linewidth", *shape, "zorder")]
 
 
 def _ticks(axis):

@@ -1,4 +1,4 @@
-"""Assessments made by hand, whose numbers are chosen."""
+"""Assessments made by hand, whose numbers are chosen, and options of runs."""
 
 import numpy as np
 
@@ -6,6 +6,7 @@ from rollcli.rig.drive.assess import DriveAssessment, RigAssessment, RigFrames
 from rollcli.rig.drive.posterior import Estimate, Series
 from rollcli.rig.drive.quantity import Jump, Segment, SequenceAssessment
 from rollcli.rig.quantities import SIZE
+from rollcli.run import options
 
 UNKNOWN = Estimate()
 
@@ -67,4 +68,15 @@ def rig(*drives, changes=None, ok=None, suspect=None, include_suspect=False):
         sum(each.outliers for each in rolls),
         include_suspect,
         tuple(made),
+    )
+
+
+def options_of(*inputs, images=options.ImageOptions(), **result):  # noqa: B008 (it does not change)
+    """The options of a run over inputs, those of its result by name."""
+    return options.EstimateOptions(
+        inputs=options.InputOptions(inputs),
+        running=options.RunningOptions(),
+        method=options.MethodOptions(),
+        images=images,
+        result=options.ResultOptions(**result),
     )

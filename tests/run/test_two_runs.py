@@ -7,20 +7,13 @@ from rollcli.files.locking import locked_folder
 from rollcli.files.results import Row, read_result
 from rollcli.run.batch import BatchOptions, join_results
 from rollcli.run.frame import FrameResult
-from rollcli.run.options import (
-    EstimateOptions,
-    FrameOptions,
-    ImageOptions,
-    InputOptions,
-    MethodOptions,
-    ResultOptions,
-    RunningOptions,
-)
+from rollcli.run.options import FrameOptions, ResultOptions
 from rollcli.run.plan import make_plan
 from rollcli.run.progress import RunSummary
 from rollcli.run.result import open_output
 from rollcli.run.resume import RunRecord
 from rollcli.run.workers.chunks import Span
+from tests.run.rigs import options_of
 from tests.run_cli import contents, rollcli, write_maps
 
 
@@ -28,16 +21,7 @@ from tests.run_cli import contents, rollcli, write_maps
 def plan(bucket, tmp_path):
     """The plan of a run over four maps on disk, in parts of two rows in the bucket."""
     write_maps(tmp_path / "maps", 4)
-    result = ResultOptions(output=f"{bucket}/rolls.csv", part_rows=2)
-    return make_plan(
-        EstimateOptions(
-            inputs=InputOptions((str(tmp_path / "maps"),)),
-            running=RunningOptions(),
-            method=MethodOptions(),
-            images=ImageOptions(),
-            result=result,
-        )
-    )
+    return make_plan(options_of(str(tmp_path / "maps"), output=f"{bucket}/rolls.csv", part_rows=2))
 
 
 def append(output, frames, first=0):

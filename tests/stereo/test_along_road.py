@@ -9,12 +9,13 @@ import pytest
 
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.request import Request
+from rollcli.estimator.road.find import road_plane
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
 from rollcli.stereo import match as matching
 from rollcli.stereo.match import StereoOptions, compute_disparity, match_pair
-from tests.odd_views import find_road, seen_by
+from tests.odd_views import seen_by
 from tests.real_pairs import LIDAR, needs_lidar, real_pairs
 from tests.true_disparity import true_disparity
 
@@ -33,7 +34,7 @@ def whole(street):
 
 @pytest.fixture(scope="module")
 def road(street):
-    return match_pair(street.left, street.right, StereoOptions(), find_road)
+    return match_pair(street.left, street.right, StereoOptions(), road_plane)
 
 
 def test_the_road_is_as_near_to_the_truth_as_in_the_whole_map(whole, road):
@@ -56,7 +57,7 @@ def test_what_lies_above_and_beside_the_road_is_known_at_a_third_of_the_size(who
 
 def angles(left, right):
     """Both estimates: along the road, and from the whole match."""
-    for finder in (find_road, None):
+    for finder in (road_plane, None):
         match = match_pair(left, right, StereoOptions(), finder)
         yield estimate_roll(match.disparity, Request(slope_error=match.slope_error))
 
@@ -83,7 +84,7 @@ def test_real_roads_get_the_angle_of_the_whole_match():
 
 
 def assert_map_agrees(left, right):
-    match = match_pair(left, right, StereoOptions(), find_road)
+    match = match_pair(left, right, StereoOptions(), road_plane)
     request = Request(slope_error=match.slope_error)
     along = estimate_roll(match.disparity, request)
     whole = estimate_roll(compute_disparity(left, right), request)
@@ -109,7 +110,7 @@ def test_a_map_of_a_real_pair_gives_its_angle():
 def test_a_right_view_that_is_out_of_place_is_levelled_on_the_way(street, road, lower, clockwise_deg):
     moved = seen_by(street.right, clockwise_deg=clockwise_deg, lower=lower)
 
-    found = match_pair(street.left, moved, StereoOptions(), find_road)
+    found = match_pair(street.left, moved, StereoOptions(), road_plane)
 
     assert found.corrected.offset == pytest.approx(lower, abs=0.15)
     assert math.degrees(found.corrected.rotation) == pytest.approx(clockwise_deg, abs=0.03)
@@ -147,7 +148,7 @@ def test_without_a_road_all_is_matched_as_a_whole(street, whole):
 )
 def test_who_sets_how_to_match_gets_that_match_of_the_road(street, given):
     options = StereoOptions(**given)
-    found, whole = (match_pair(street.left, street.right, options, finder) for finder in (find_road, None))
+    found, whole = (match_pair(street.left, street.right, options, finder) for finder in (road_plane, None))
     below = np.s_[300:]
     assert (np.abs(found.disparity - whole.disparity)[below] < 0.1).mean() > 0.98
     assert not found.lacks_road  # none was asked for
@@ -155,14 +156,14 @@ def test_who_sets_how_to_match_gets_that_match_of_the_road(street, given):
 
 @pytest.mark.parametrize("given", [{"align": "off"}, {"vertical_offset": 0.0}])
 def test_a_given_alignment_changes_no_road_of_level_views(street, road, given):
-    found = match_pair(street.left, street.right, StereoOptions(**given), find_road)
+    found = match_pair(street.left, street.right, StereoOptions(**given), road_plane)
     np.testing.assert_array_equal(found.disparity, road.disparity)
     assert not found.lacks_road
 
 
 def test_behind_the_horizon_all_is_matched_as_a_whole(street):
     options = StereoOptions(min_disparity=-16)
-    found, whole = (match_pair(street.left, street.right, options, finder) for finder in (find_road, None))
+    found, whole = (match_pair(street.left, street.right, options, finder) for finder in (road_plane, None))
     np.testing.assert_array_equal(found.disparity, whole.disparity)
 
 
@@ -191,7 +192,7 @@ def test_a_wide_view_is_matched_over_a_wider_range():
 def test_a_road_found_along_its_plane_beyond_the_range_is_not_at_its_end(street, monkeypatch):
     looked = matching.first_look
     monkeypatch.setattr(matching, "first_look", lambda small: replace(looked(small), range=56))
-    found = match_pair(street.left, street.right, StereoOptions(), find_road)
+    found = match_pair(street.left, street.right, StereoOptions(), road_plane)
 
     assert found.disparity.max() > found.num_disparities + 10
     assert found.end_fraction < 0.05
@@ -203,7 +204,7 @@ def test_black_borders_of_views_are_no_data_and_the_road_is_found(street, border
         cv2.copyMakeBorder(each, *border, 40, 40, cv2.BORDER_CONSTANT, value=level)
         for each in (street.left, street.right)
     )
-    found = match_pair(left, right, StereoOptions(), find_road)
+    found = match_pair(left, right, StereoOptions(), road_plane)
     estimate = estimate_roll(found.disparity)
 
     assert not found.disparity[-60:].any()
@@ -217,7 +218,7 @@ def test_a_street_of_which_one_view_was_exposed_half_as_long_has_much_the_same_r
         cv2.imread(str(LIDAR / side / "000002.png"), cv2.IMREAD_GRAYSCALE) for side in ("left", "right")
     )
     same, darker = (
-        estimate_roll(match_pair(each, right, StereoOptions(), find_road).disparity)
+        estimate_roll(match_pair(each, right, StereoOptions(), road_plane).disparity)
         for each in (left, left // 2)
     )
 

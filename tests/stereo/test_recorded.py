@@ -10,13 +10,14 @@ import cv2
 import numpy as np
 
 from rollcli.errors import RollcliError
+from rollcli.estimator.road.find import road_plane
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
 from rollcli.stereo.alignment import level, seen_from_right
 from rollcli.stereo.match import StereoOptions, match_pair
 from rollcli.stereo.misalignment import Misalignment
 from rollcli.stereo.row_fit import ColumnEvidence, column_support
-from tests.odd_views import find_road, seen_by
+from tests.odd_views import seen_by
 from tests.recorded import recorded_test
 
 SIZE = (224, 160)
@@ -128,12 +129,12 @@ CASES = {
     ),
     "corrected otherwise": partial(_corrected, {"lower": -3.0}),
     "given": partial(_match, _scene, {"lower": 2.0}, vertical_offset=2.0),
-    "along the road": partial(_match, _scene, None, find_road),
-    "along a road of full size": partial(_match, FULL, None, find_road),
-    "along a road in a high view": partial(_match, HIGH, ODD, find_road),
-    "a high view, whole": partial(_match, HIGH, ODD, find_road, whole=True),
-    "full size, whole": partial(_match, FULL, ODD, find_road, whole=True),
-    "whole": partial(_match, _scene, None, find_road, whole=True),
+    "along the road": partial(_match, _scene, None, road_plane),
+    "along a road of full size": partial(_match, FULL, None, road_plane),
+    "along a road in a high view": partial(_match, HIGH, ODD, road_plane),
+    "a high view, whole": partial(_match, HIGH, ODD, road_plane, whole=True),
+    "full size, whole": partial(_match, FULL, ODD, road_plane, whole=True),
+    "whole": partial(_match, _scene, None, road_plane, whole=True),
     "smaller": partial(_match, _scene, None, downscale=1.5),
     "five ways": partial(_match, _scene, None, mode="sgbm", num_disparities=48, block_size=7),
     "eight ways": partial(_match, _scene, None, mode="hh", speckle_size=0, uniqueness=2),

@@ -9,13 +9,14 @@ import pytest
 from rollcli.errors import InputError, UsageError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.request import Request
+from rollcli.estimator.road.find import road_plane
 from rollcli.files.formats import read_image
 from rollcli.files.inputs import pair_inputs
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
 from rollcli.stereo import sgbm
 from rollcli.stereo.match import StereoOptions, compute_disparity, match_pair
-from tests.odd_views import find_road, seen_by
+from tests.odd_views import seen_by
 from tests.real_pairs import ROADS, ROLL_DEG, STREETS, needs_roads, needs_streets
 
 
@@ -128,7 +129,7 @@ def test_colour_grey_and_16_bits_give_much_the_same(street):
 
 def test_the_whole_map_beside_it_has_every_row_at_full_size(street):
     at_once = match_pair(street.left, street.right, StereoOptions()).disparity
-    shown = match_pair(street.left, street.right, StereoOptions(), find_road)
+    shown = match_pair(street.left, street.right, StereoOptions(), road_plane)
     alone = shown.disparity.copy()
 
     assert shown.whole is shown.whole  # matched once
