@@ -1,11 +1,9 @@
 """Each kind of request to a store is repeated when it fails for the network's sake."""
 
-import socket
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from rollcli.errors import InputError
 from rollcli.files import storage
 from rollcli.files.stores.objects import _listed, _store, list_objects
 from tests.store_proxy import CUT, NEVER, PASS, Faults, proxied
@@ -77,19 +75,6 @@ def test_a_listing_that_is_cut_continues_after_the_last_name(monkeypatch):
                 yield [{"path": name} for name in rest[first : first + 2]]
 
     assert [found["path"] for found in _listed(Store(), "p")] == names
-
-
-def test_a_store_that_takes_too_long_is_told_from_one_that_is_not_there(monkeypatch):
-    pytest.importorskip("obstore", reason="obstore, of the extra storage, is not here")
-    with socket.create_server(("127.0.0.1", 0)) as silent:
-        monkeypatch.setenv("AWS_ENDPOINT_URL", f"http://127.0.0.1:{silent.getsockname()[1]}")
-        monkeypatch.setenv("AWS_ACCESS_KEY_ID", "test")
-        monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "test")
-        monkeypatch.setenv("ROLLCLI_STORE_TIMEOUT", "0.1")
-        monkeypatch.setattr("rollcli.files.stores.objects._RETRIES", 0)
-        monkeypatch.setattr("rollcli.files.stores.objects._TRIES", 1)
-        with pytest.raises(InputError, match=r"TIMEOUT sets the seconds it may take \(0.1\), for up to 1 GB"):
-            storage.read_bytes("s3://silent/x.png")
 
 
 class FirstFails:

@@ -60,6 +60,14 @@ def seen(open_page_once, url):
     return lambda width=1280, scheme="light": opened_page(width=width, scheme=scheme)
 
 
+def page_of(folder, rows, frames_shown=0):
+    """The address of the page of a result with these rows."""
+    write_result(folder / "rolls.csv", rows)
+    gallery = ("--gallery", str(frames_shown))
+    assert rollcli("report", "rolls.csv", "-o", "page.html", *gallery, cwd=folder).status == 0
+    return (folder / "page.html").as_uri()
+
+
 def luminance(colour):
     """Relative luminance of a CSS colour, as WCAG 2 has it."""
     parts = [int(part) / 255 for part in re.findall(r"\d+", colour)[:3]]
@@ -95,10 +103,7 @@ def test_the_charts_are_there(seen):
     ],
 )
 def test_a_result_of_one_kind_of_frame_has_a_page_without_complaint(opened, tmp_path, rows):
-    write_result(tmp_path / "rolls.csv", rows)
-    done = rollcli("report", "rolls.csv", "-o", "page.html", "--gallery", "0", cwd=tmp_path)
-    assert done.status == 0
-    page = opened(url=(tmp_path / "page.html").as_uri())
+    page = opened(url=page_of(tmp_path, rows))
     assert page.locator("#roll .legendtext").count() >= 1
 
 
@@ -232,9 +237,7 @@ def test_a_printed_page_shows_both_sides_of_the_switch_and_keeps_headings_with_w
     rows = [
         row(f"drives/a_long_name_of_a_day/image_2/{i:06}.png", 1.0, 1.5, "suspect", reason) for i in range(40)
     ]
-    write_result(tmp_path / "rolls.csv", rows)
-    assert rollcli("report", "rolls.csv", "-o", "page.html", "--gallery", "0", cwd=tmp_path).status == 0
-    for each in (page, opened(url=(tmp_path / "page.html").as_uri())):
+    for each in (page, opened(url=page_of(tmp_path, rows))):
         each.emulate_media(media="print")
         each.evaluate(IN_PAGE["columns"])
         assert each.evaluate("document.querySelector('main').scrollWidth") > 1500  # several pages
@@ -244,10 +247,8 @@ def test_a_printed_page_shows_both_sides_of_the_switch_and_keeps_headings_with_w
 def test_a_hundred_and_twenty_frames_are_a_sheet_of_answer_and_six_of_pictures(opened, tmp_path):
     write_kitti(tmp_path / "map.png", road_map(0.02, width=480))
     rolls = np.random.default_rng(2).normal(1.1, 0.2, 120)
-    write_result(tmp_path / "rolls.csv", [row("map.png", roll) for roll in rolls.tolist()])
-    done = rollcli("report", "rolls.csv", "-o", "page.html", "--gallery", "120", cwd=tmp_path)
-    assert done.status == 0
-    page = opened(url=(tmp_path / "page.html").as_uri(), scheme="dark")
+    url = page_of(tmp_path, [row("map.png", roll) for roll in rolls.tolist()], frames_shown=120)
+    page = opened(url=url, scheme="dark")
     assert len(re.findall(rb"/Type /Page\b", page.pdf(format="A4"))) <= 7
 
     page.emulate_media(media="print")
@@ -304,9 +305,7 @@ def long_url(tmp_path_factory):
         )
         for i in range(10_000)
     ]
-    write_result(folder / "rolls.csv", rows)
-    assert rollcli("report", "rolls.csv", "-o", "page.html", "--gallery", "0", cwd=folder).status == 0
-    return (folder / "page.html").as_uri()
+    return page_of(folder, rows)
 
 
 def shown_rows(page):

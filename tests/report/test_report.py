@@ -49,6 +49,22 @@ def page_of(folder):
     return (folder / "page.html").read_text("utf-8")
 
 
+def pictures_of(folder):
+    """The pictures of a page, base64."""
+    return PICTURES.findall(page_of(folder))
+
+
+def seen(picture):
+    return cv2.imdecode(np.frombuffer(base64.b64decode(picture), np.uint8), cv2.IMREAD_COLOR).astype(float)
+
+
+def estimate_pairs(folder, frames, size, *images):
+    """Render pairs, and estimate them."""
+    rollcli("simulate", "rig", "--frames", frames, "--size", size, "-q", cwd=folder)
+    pair = ["--left", "rig/left", "--right", "rig/right", "--num-disparities", "32"]
+    rollcli("estimate", *pair, "-o", "rolls.csv", *images, cwd=folder)
+
+
 def test_a_page_holds_everything_it_shows(folder):
     done = report(folder, "out/rolls.csv")
     assert (done.status, done.out) == (0, "")
@@ -96,7 +112,7 @@ def test_pictures_come_from_the_images_that_estimate_wrote(folder, images):
     (page,) = folder.glob("*.html")
     assert f", {page.stat().st_size / 1e6:.1f} MB" in done.err
     # of the map itself nothing is left; the level map gives its v-disparity too
-    assert len(PICTURES.findall(page_of(folder))) == (3 if images == "out/v" else 6)
+    assert len(pictures_of(folder)) == (3 if images == "out/v" else 6)
     assert page_of(folder).count("maps/frame0.png: there is no map of it among the images") == 1
 
 
@@ -119,14 +135,12 @@ def test_only_the_pages_own_scripts_and_styles_are_active_and_nothing_is_request
 
 @pytest.mark.slow
 def test_pairs_are_shown_from_their_computed_maps_or_matched_anew(tmp_path):
-    rollcli("simulate", "rig", "--frames", "2", "--size", "200x120", "-q", cwd=tmp_path)
-    pair = ["--left", "rig/left", "--right", "rig/right", "--num-disparities", "32"]
-    rollcli("estimate", *pair, "-o", "rolls.csv", "--disparity", "maps", "--save-as", "npy", cwd=tmp_path)
+    estimate_pairs(tmp_path, "2", "200x120", "--disparity", "maps", "--save-as", "npy")
     assert report(tmp_path, "rolls.csv", "--images", "maps").status == 0
-    from_maps = PICTURES.findall(page_of(tmp_path))
+    from_maps = pictures_of(tmp_path)
     shutil.rmtree(tmp_path / "maps")
     assert report(tmp_path, "rolls.csv", "--overwrite").status == 0
-    anew = PICTURES.findall(page_of(tmp_path))
+    anew = pictures_of(tmp_path)
     # without the left image there is no road on it, and heights are not drawn over it
     matched = [each for place, each in enumerate(anew) if place % 6 not in (0, 3)]
     assert matched == [each for place, each in enumerate(from_maps) if place % 5 != 2]
@@ -135,25 +149,19 @@ def test_pairs_are_shown_from_their_computed_maps_or_matched_anew(tmp_path):
 
 @pytest.mark.slow
 def test_the_road_is_tinted_on_the_left_image_of_a_pair_as_estimate_draws_it(tmp_path):
-    rollcli("simulate", "rig", "--frames", "1", "--size", "320x200", "-q", cwd=tmp_path)
-    pair = ["--left", "rig/left", "--right", "rig/right", "--num-disparities", "32"]
-    rollcli("estimate", *pair, "-o", "rolls.csv", "--road-mask", "out/road_mask", cwd=tmp_path)
+    estimate_pairs(tmp_path, "1", "320x200", "--road-mask", "out/road_mask")
     (drawn,) = (cv2.imread(str(path)) for path in (tmp_path / "out" / "road_mask").iterdir())
     for images in ([], ["--images", "out"]):
         assert report(tmp_path, "rolls.csv", *images, "--overwrite").status == 0
-        data = base64.b64decode(PICTURES.findall(page_of(tmp_path))[0])
-        shown = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-        assert np.abs(shown.astype(float) - drawn).mean() < 8  # WebP loses a little
+        assert np.abs(seen(pictures_of(tmp_path)[0]) - drawn).mean() < 8  # WebP loses a little
 
 
 def test_a_road_that_the_result_was_not_made_from_is_not_shown(tmp_path):
-    rollcli("simulate", "rig", "--frames", "1", "--size", "320x200", "-q", cwd=tmp_path)
-    pair = ["--left", "rig/left", "--right", "rig/right", "--num-disparities", "32"]
-    rollcli("estimate", *pair, "-o", "rolls.csv", cwd=tmp_path)
+    estimate_pairs(tmp_path, "1", "320x200")
     (made,) = read_result(tmp_path / "rolls.csv").rows
     write_result(tmp_path / "rolls.csv", [replace(made, roll_deg=made.roll_deg + 0.01)])
     assert report(tmp_path, "rolls.csv").status == 0
-    assert len(PICTURES.findall(page_of(tmp_path))) == 5
+    assert len(pictures_of(tmp_path)) == 5
 
 
 def test_an_interrupted_report_writes_nothing(folder, monkeypatch):
@@ -221,9 +229,9 @@ def test_heights_are_shown_as_estimate_drew_them_or_made_in_the_same_colours(tmp
     (drawn,) = (cv2.imread(str(path)) for path in (tmp_path / "out" / "heights_preview").iterdir())
     for images in ([], ["--images", "out"]):
         assert report(tmp_path, "rolls.csv", *images, "--overwrite").status == 0
-        data = base64.b64decode(PICTURES.findall(page_of(tmp_path))[0 if images else 2])
-        shown = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-        assert np.abs(shown.astype(float) - drawn).mean() < 4  # WebP loses a little
+        assert (
+            np.abs(seen(pictures_of(tmp_path)[0 if images else 2]) - drawn).mean() < 4
+        )  # WebP loses a little
 
 
 @pytest.mark.slow
