@@ -119,8 +119,5 @@ def _pages(browser):
 
 
 def _outside(requested, url):
-    return (
-        []
-        if requested.partition("#")[0] == url.partition("#")[0] or requested.startswith(("data:", "blob:"))
-        else [requested]
-    )
+    inside = requested.partition("#")[0] == url.partition("#")[0]
+    return [] if inside or requested.startswith(("data:", "blob:")) else [requested]

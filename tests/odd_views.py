@@ -1,7 +1,17 @@
-"""What a right camera sees that is turned, lower or larger."""
+"""What a right camera sees: a texture further left, and all of a view that is turned, lower or larger."""
 
 import cv2
 import numpy as np
+
+
+def pair_at(disparity, shape=(120, 400), seed=0, first=None):
+    """A random texture, seen again `disparity` pixels (a number, or one a row) further left."""
+    texture = np.random.default_rng(seed).integers(0, 256, (shape[0], 2 * shape[1]), dtype=np.uint8)
+    texture = cv2.GaussianBlur(texture, (3, 3), 0)
+    columns = np.arange(shape[1]) + (first or shape[1] // 2)
+    shifts = np.broadcast_to(np.rint(disparity).astype(int), shape[0])
+    right = np.stack([row[columns + shift] for row, shift in zip(texture, shifts, strict=True)])
+    return texture[:, columns], right
 
 
 def seen_by(view, *, clockwise_deg=0.0, larger_percent=0.0, lower=0.0, border=cv2.BORDER_REFLECT):

@@ -42,11 +42,12 @@ def check(package, case, answer, *, rel=1e-6, least=1e-6):
 
 
 def recorded_test(package, cases, *, rel=1e-6, least=1e-6):
-    """The test that each case of a package has the recorded answer."""
+    """The test that each case of a package has the recorded answer; `least` may depend on the case."""
 
     @pytest.mark.parametrize("case", cases)
     def test_answers_are_those_recorded(case):
-        check(package, case, cases[case](), rel=rel, least=least)
+        within = least(case) if callable(least) else least
+        check(package, case, cases[case](), rel=rel, least=within)
 
     return test_answers_are_those_recorded
 

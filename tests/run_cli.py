@@ -231,7 +231,11 @@ def write_pair(folder: Path, name: str, disparity, seed: int = 0) -> None:
         np.take_along_axis(texture, np.where(each < 0, -1 - each, each), 1) for each in (first, first + 1)
     )
     seen = one + (at - first) * (other - one)
-    for side, image in (("left", seen), ("right", texture[:, 32 : 32 + width])):
-        path = folder / side / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(cv2.imencode(".png", image.astype(np.uint8))[1])
+    write_views(folder, name, seen.astype(np.uint8), texture[:, 32 : 32 + width].astype(np.uint8))
+
+
+def write_views(folder: Path, name: str, *views) -> None:
+    """The views of a pair as folder/left/name and folder/right/name, PNG."""
+    for side, view in zip(("left", "right"), views, strict=True):
+        (folder / side).mkdir(parents=True, exist_ok=True)
+        (folder / side / name).write_bytes(cv2.imencode(".png", view)[1])

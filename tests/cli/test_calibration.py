@@ -15,7 +15,7 @@ from tests.estimator.synthetic_maps import banked_road
 from tests.rig import calibration_files as samples
 from tests.rig.calibration_files import Rig
 from tests.rig.test_pose import cast
-from tests.run_cli import rollcli, rows_of, write_kitti
+from tests.run_cli import rollcli, rows_of, write_kitti, write_views
 
 RIG = Rig(fx=250.0, fy=250.0, cx=150.0, cy=90.0, baseline=0.5, width=320, height=200)
 CALIBRATION = Calibration(RIG.fx, RIG.fy, RIG.cx, RIG.cy, RIG.baseline)
@@ -70,9 +70,7 @@ def test_downscaled_pairs_have_the_pose_of_the_full_size(tmp_path):
     asked, agree = SimulateOptions(frames=10, scene="open", curvature=(0, 0), seed=6, grey=True, **rig), []
     for number, spec in enumerate(draw_specs(asked)):
         folder, frame = tmp_path / str(number), render_frame(spec)
-        for side, image in (("left", frame.left), ("right", frame.right)):
-            (folder / side).mkdir(parents=True)
-            cv2.imwrite(str(folder / side / "a.png"), image)
+        write_views(folder, "a.png", frame.left, frame.right)
         (folder / "calib.txt").write_bytes(calibration(spec))
         poses = []
         for factor in ("1", "2"):

@@ -1,6 +1,5 @@
 """`rollcli evaluate paper` as a user runs it."""
 
-import importlib.util
 import re
 import shutil
 
@@ -15,10 +14,8 @@ from tests.run_cli import contents, interrupt_in, rollcli, rows_of
 
 FAST = ("--turns", "-8:8:8", "--timed", "1")
 
-pytestmark = pytest.mark.skipif(
-    not all(map(importlib.util.find_spec, ("plotly", "jinja2", "matplotlib"))),
-    reason="the extra `report` is not installed",
-)
+for each in ("plotly", "jinja2", "matplotlib"):
+    pytest.importorskip(each, reason="the extra `report` is not installed")
 
 
 def write_maps(folder, *names):

@@ -9,7 +9,7 @@ import pytest
 
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
-from tests.run_cli import command, ended, road_map, rollcli, rows_of, write_kitti, write_pair
+from tests.run_cli import command, ended, road_map, rollcli, rows_of, write_kitti, write_pair, write_views
 
 
 def column(text, name):
@@ -47,9 +47,7 @@ def test_a_pair_whose_views_are_not_level_is_corrected_and_says_so(tmp_path):
 def test_a_pair_gives_the_same_row_whether_its_whole_map_is_written_or_not(tmp_path, options):
     spec = FrameSpec(scene="street", roll=math.radians(4), size=(320, 240), seed=3)
     frame = render_frame(spec)
-    for side in ("left", "right"):
-        (tmp_path / side).mkdir()
-        cv2.imwrite(str(tmp_path / side / "a.png"), getattr(frame, side))
+    write_views(tmp_path, "a.png", frame.left, frame.right)
     pairs = ("--left", "left", "--right", "right")
 
     alone = rollcli("estimate", *pairs, *options, cwd=tmp_path).out

@@ -1,12 +1,12 @@
 """A URL works wherever a path does, and one that names no file is refused."""
 
 import re
-from functools import partial
 
 import pytest
 
 from rollcli.files.stores import locations
 from rollcli.files.stores.locations import names_a_file
+from tests.object_store import objects_below
 from tests.run_cli import contents, road_map, rollcli, rollcli_process, rows_of, write_maps, write_pair
 from tests.slow import mostly_slow
 from tests.web_server import response, web_server
@@ -65,16 +65,6 @@ def places(store, tmp_path_factory):
         yield folder, bucket
 
 
-def below(bucket):
-    """What reads an object, by its path; a result of one part under the name of its folder."""
-    from rollcli.files.storage import read_bytes
-    from rollcli.files.stores.objects import list_objects
-
-    urls = [url for url, *_ in list_objects(f"{bucket}/")]
-    names = [re.sub(r"/part-00000\.\w+$", "", url.removeprefix(f"{bucket}/")) for url in urls]
-    return {name: partial(read_bytes, url) for name, url in zip(names, urls, strict=True)}
-
-
 @pytest.mark.parametrize("what", mostly_slow(LINES, "folders", "derotate", "rig", "report"))
 def test_a_url_works_as_a_path_does(places, store, what):
     folder, bucket = places
@@ -85,14 +75,15 @@ def test_a_url_works_as_a_path_does(places, store, what):
     run = rollcli_process if LINES[what].startswith(WITH_WORKERS) else rollcli
     there = run(*LINES[what].replace("@/", f"{bucket}/").split(), cwd=folder, **store)
     assert (here.status, there.status) == (0, 0), there.err
-    found = below(bucket)
+    # a result of one part under the name of its folder
+    found = {re.sub(r"/part-00000\.\w+$", "", name): data for name, data in objects_below(bucket).items()}
     written = contents(folder)
     assert written.keys() > before
     for name in written.keys() - before:
         if not name.endswith((".run.json", ".inputs", ".html")):
-            assert found[name]().replace(f"{bucket}/".encode(), b"") == written[name], name
+            assert found[name].replace(f"{bucket}/".encode(), b"") == written[name], name
         elif name.endswith(".html"):
-            counted = [data.count(b"data:image/webp") for data in (found[name](), written[name])]
+            counted = [data.count(b"data:image/webp") for data in (found[name], written[name])]
             assert counted[0] == counted[1] > 0
 
 

@@ -29,7 +29,7 @@ from rollcli.pictures.vdisparity import (
     v_disparity,
 )
 from rollcli.rig.calibration import Calibration
-from tests.recorded import check, made
+from tests.recorded import made, recorded_test
 
 SQUARE = Calibration(400, 400, 159.5, 70, 0.5)
 RIGS = {
@@ -310,9 +310,8 @@ CASES = {
 }
 
 
-PICTURES = tuple(name for name in CASES if name.startswith(("picture", "disp", "preview", "road ", "v-disp")))
+def _least(case):
+    return 5e-3 if case.startswith(("picture", "disp", "preview", "road ", "v-disp")) else 2e-5
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_answers_are_those_recorded(case):
-    check("pictures", case, CASES[case](), rel=2e-4, least=5e-3 if case in PICTURES else 2e-5)
+test_answers_are_those_recorded = recorded_test("pictures", CASES, rel=2e-4, least=_least)

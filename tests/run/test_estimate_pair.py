@@ -2,7 +2,6 @@
 
 import math
 
-import cv2
 import numpy as np
 import pytest
 
@@ -11,7 +10,8 @@ from rollcli.files.results import ALIGNMENT_COLUMNS
 from rollcli.run.read import Source, _carried
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
-from tests.run_cli import rollcli, rows_of
+from tests.odd_views import seen_by
+from tests.run_cli import rollcli, rows_of, write_views
 
 CAMERA = "P{}: {f} 0 {x} {} 0 {f} {y} 0 0 0 1 0\n"
 
@@ -22,12 +22,8 @@ def pair(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pair")
     frame = render_frame(FrameSpec(scene="open", roll=math.radians(3), seed=12, colour=False))
     height, width = frame.right.shape
-    matrix = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), 0, 1.004)
-    matrix[1, 2] += 1
-    right = cv2.warpAffine(frame.right, matrix, (width, height), flags=cv2.INTER_CUBIC)
-    for side, view in (("left", frame.left), ("right", right)):
-        (folder / side).mkdir()
-        cv2.imwrite(str(folder / side / "a.png"), view)
+    right = seen_by(frame.right, larger_percent=0.4, lower=1)
+    write_views(folder, "a.png", frame.left, right)
     where = {"f": 0.58 * width, "x": (width - 1) / 2, "y": (height - 1) / 2}
     lines = CAMERA.format(0, 0, **where) + CAMERA.format(1, -0.3 * width, **where)
     (folder / "calib.txt").write_text(lines)
@@ -91,15 +87,11 @@ def test_the_row_says_where_no_road_was_matched_along_its_plane(pair, tmp_path):
     _, *views = pair
     height, width = views[0].shape
     board = np.random.default_rng(0).integers(0, 256, (9 * height // 20, width - 140), dtype=np.uint8)
-    for name, view, first in (
-        ("left", views[0], 100),
-        ("right", views[1], 40),
-    ):  # nearer than most of the road
-        (tmp_path / name).mkdir()
-        cv2.imwrite(str(tmp_path / name / "road.png"), view)
-        hidden = view.copy()
-        hidden[-len(board) :, first : first + board.shape[1]] = board
-        cv2.imwrite(str(tmp_path / name / "hidden.png"), hidden)
+    hidden = [view.copy() for view in views]
+    for view, first in zip(hidden, (100, 40), strict=True):  # nearer than most of the road
+        view[-len(board) :, first : first + board.shape[1]] = board
+    write_views(tmp_path, "road.png", *views)
+    write_views(tmp_path, "hidden.png", *hidden)
     rows = rows_of(rollcli("estimate", "--left", "left", "--right", "right", cwd=tmp_path).out)
     says = "matched over the whole range, as too little road was found to match along"
     assert [says in row["message"] for row in rows] == [True, False]

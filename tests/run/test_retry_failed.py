@@ -4,6 +4,7 @@ import os
 import shutil
 from functools import partial
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -60,14 +61,14 @@ def mend(folder, maps, *indices):
         shutil.copyfile(maps / name, folder / "maps" / name)
 
 
-def anew(folder, line):
-    """Everything that a run makes of these maps, written to the same names."""
+def assert_is_as_anew(folder, line):
+    """What there is must be all that a run makes of these maps, written to the same names."""
     kept = folder / "kept"
     kept.mkdir()
     for path in [each for each in folder.iterdir() if each.name not in ("maps", "kept")]:
         path.rename(kept / path.name)
     assert rollcli(*line, cwd=folder).status == 0
-    return contents(folder, without=("maps/", "kept/")), contents(kept)
+    assert contents(kept) == contents(folder, without=("maps/", "kept/"))
 
 
 @pytest.mark.parametrize("result", ["rolls.csv", "rolls.jsonl", "rolls.parquet"])
@@ -85,8 +86,7 @@ def test_frames_whose_files_were_mended_end_in_the_bytes_of_a_run_without_failur
     assert twice.status == 0, twice.err
     changed = {path.name for path, inode in before.items() if path.stat().st_ino != inode}
     assert changed <= {"part-00000.parquet"}
-    fresh, kept = anew(folder, line)
-    assert kept == fresh
+    assert_is_as_anew(folder, line)
 
 
 def test_a_retry_that_is_interrupted_keeps_what_it_has_done_and_is_taken_up_again(folder, maps, monkeypatch):
@@ -101,8 +101,7 @@ def test_a_retry_that_is_interrupted_keeps_what_it_has_done_and_is_taken_up_agai
     statuses = [row.status for row in read_result(folder / "rolls.csv").rows]
     assert [statuses[index] for index in BROKEN] == ["ok", "error", "error"]
     assert rollcli(*line, *RETRY, cwd=folder).status == 0
-    fresh, kept = anew(folder, line)
-    assert kept == fresh
+    assert_is_as_anew(folder, line)
 
 
 def made_at_least(folder, count):
@@ -127,8 +126,7 @@ def test_a_retry_killed_at_any_time_loses_no_row_and_is_taken_up_again(tmp_path)
         rows = (tmp_path / "rolls.csv").read_text().splitlines()[1:]
         assert [row.split(",")[0] for row in rows] == [f"maps/frame{index:02}.png" for index in range(COUNT)]
     assert rollcli(*line, *RETRY, cwd=tmp_path).status == 0
-    fresh, kept = anew(tmp_path, line)
-    assert kept == fresh
+    assert_is_as_anew(tmp_path, line)
 
 
 @pytest.mark.parametrize(
@@ -156,8 +154,7 @@ def test_a_run_that_ends_between_rows_and_what_says_of_their_files_is_taken_up_a
     monkeypatch.undo()
     done = rollcli(*line, *flags, cwd=folder)
     assert done.status == 0, done.err
-    fresh, kept = anew(folder, line)
-    assert kept == fresh
+    assert_is_as_anew(folder, line)
 
 
 def test_a_link_to_a_result_stays_one_and_its_file_keeps_its_rights(folder, maps):
@@ -183,10 +180,7 @@ def stopped(request, folder, maps, monkeypatch):
     line = ("estimate", "maps", "-o", place + result, "--derotated", f"{place}up", "--part-rows", "5")
     assert rollcli(*line, cwd=folder).status == 3
     mend(folder, maps, *BROKEN)
-
-    def full(*_, **__):
-        raise OutputError("the disk is full")
-
+    full = Mock(side_effect=OutputError("the disk is full"))
     with monkeypatch.context() as patch:
         patch.setattr("rollcli.run.result_file.ResultFile.replace", full)
         patch.setattr("rollcli.run.parts.write_bytes", full)

@@ -17,7 +17,7 @@ from rollcli.stereo.alignment import level, seen_from_right
 from rollcli.stereo.match import StereoOptions, match_pair
 from rollcli.stereo.misalignment import Misalignment
 from rollcli.stereo.row_fit import ColumnEvidence, column_support
-from tests.odd_views import seen_by
+from tests.odd_views import pair_at, seen_by
 from tests.recorded import recorded_test
 
 SIZE = (224, 160)
@@ -31,11 +31,7 @@ def _scene(scene="street", seed=3, size=SIZE, focal=150.0):
 
 def _texture(disparity=14.0, slope=0.0):
     """Random dots whose disparity grows by `slope` px from row to row."""
-    wide = np.random.default_rng(5).integers(0, 256, (120, 480), dtype=np.uint8)
-    wide = cv2.GaussianBlur(wide, (3, 3), 0)
-    columns = np.arange(240) + 100
-    shifts = np.rint(disparity + slope * np.arange(120)).astype(int)
-    return wide[:, columns], np.stack([row[columns + shift] for row, shift in zip(wide, shifts, strict=True)])
+    return pair_at(disparity + slope * np.arange(120), (120, 240), seed=5, first=100)
 
 
 def _match(views, odd=None, road=None, *, whole=False, **options):

@@ -16,18 +16,8 @@ from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
 from rollcli.stereo import sgbm
 from rollcli.stereo.match import StereoOptions, compute_disparity, match_pair
-from tests.odd_views import seen_by
+from tests.odd_views import pair_at, seen_by
 from tests.real_pairs import ROADS, ROLL_DEG, STREETS, needs_roads, needs_streets
-
-
-def pair_at(disparity, shape=(120, 400), seed=0):
-    """A random texture, seen again `disparity` pixels (a number, or one a row) further left."""
-    texture = np.random.default_rng(seed).integers(0, 256, (shape[0], 2 * shape[1]), dtype=np.uint8)
-    texture = cv2.GaussianBlur(texture, (3, 3), 0)
-    columns = np.arange(shape[1]) + shape[1] // 2
-    shifts = np.broadcast_to(np.rint(disparity).astype(int), shape[0])
-    right = np.stack([row[columns + shift] for row, shift in zip(texture, shifts, strict=True)])
-    return texture[:, columns], right
 
 
 @pytest.fixture(scope="module")

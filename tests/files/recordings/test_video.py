@@ -294,16 +294,12 @@ def test_python_iterates_the_frames_of_a_video(tmp_path, drive):
     path = write_video(tmp_path / "drive.mkv", beside(views))
     found = list(package.open_recording(path, side_by_side="left-right"))
     assert [each.name for each in found] == [f"{path}#{each:06d}" for each in range(COUNT)]
-    for each, (left, right) in zip(found, views, strict=True):
-        np.testing.assert_array_equal(each.left, left)
-        np.testing.assert_array_equal(each.right, right)
     for side, name in enumerate(("a.avi", "b.avi")):
         write_video(tmp_path / name, [each[side] for each in views], "FFV1")
-    for each, (left, right) in zip(
-        package.open_recording(tmp_path / "a.avi", right=tmp_path / "b.avi"), views, strict=True
-    ):
-        np.testing.assert_array_equal(each.left, left)
-        np.testing.assert_array_equal(each.right, right)
+    for frames in (found, package.open_recording(tmp_path / "a.avi", right=tmp_path / "b.avi")):
+        for each, (left, right) in zip(frames, views, strict=True):
+            np.testing.assert_array_equal(each.left, left)
+            np.testing.assert_array_equal(each.right, right)
     with pytest.raises(UsageError, match="is a video: give side_by_side"):
         list(package.open_recording(path))
     for elsewhere in ("s3://bucket/a.avi", "s3://bucket/a.mcap"):

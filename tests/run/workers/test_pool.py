@@ -8,6 +8,7 @@ import threading
 import time
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 
@@ -19,6 +20,7 @@ from rollcli.run.workers.pool import PoolExecutor
 from rollcli.run.workers.tasks import require_scheduler, run_tasks
 from tests.run.workers.tasks import lost, run
 from tests.run_cli import ended, environment, wait_until
+from tests.slow import mostly_slow
 
 WORK = Work(run, lost)
 
@@ -54,11 +56,14 @@ def test_a_task_that_kills_its_worker_once_is_done_by_another(tmp_path):
     assert results(*tasks) == [1, "survived", *range(2, 12)]
 
 
-def test_a_task_that_kills_two_workers_is_lost_and_costs_no_other_task():
-    done = results(("give", 1), ("die",), *(("give", number) for number in range(2, 12)))
-    assert done[1][:2] == ("lost", ("die",))
-    assert "died twice" in done[1][2]
-    assert [done[0], *done[2:]] == [1, *range(2, 12)]
+@pytest.mark.parametrize(("count", "deadly"), mostly_slow([(12, 1), (3000, 2000)], (12, 1)))
+def test_a_task_that_kills_two_workers_is_lost_and_costs_no_other_task(count, deadly):
+    tasks = [("give", number) for number in range(count)]
+    tasks[deadly] = ("die",)
+    done = results(*tasks)
+    assert done[deadly][:2] == ("lost", ("die",))
+    assert "died twice" in done[deadly][2]
+    assert [*done[:deadly], *done[deadly + 1 :]] == [each for each in range(count) if each != deadly]
 
 
 def test_errors_on_purpose_are_raised_as_they_are_and_others_say_where():
@@ -70,15 +75,6 @@ def test_errors_on_purpose_are_raised_as_they_are_and_others_say_where():
 
 def test_a_worker_computes_in_one_thread():
     assert results(("threads",), ("threads",)) == [1, 1]
-
-
-@pytest.mark.slow
-def test_one_task_of_a_large_chunk_that_kills_workers_is_found_and_named():
-    tasks = [("give", number) for number in range(3000)]
-    tasks[2000] = ("die",)
-    done = results(*tasks)
-    assert done[2000][:2] == ("lost", ("die",))
-    assert [*done[:2000], *done[2001:]] == [*range(2000), *range(2001, 3000)]
 
 
 def test_a_stop_ends_a_chunk_after_the_task_in_hand_and_begins_no_other(tmp_path):
@@ -159,9 +155,7 @@ def test_when_a_further_worker_cannot_start_the_others_end(monkeypatch):
 
 
 def test_a_system_that_starts_no_process_is_said_with_a_remedy(monkeypatch):
-    def fail():
-        raise OSError(24, "Too many open files")
-
+    fail = Mock(side_effect=OSError(24, "Too many open files"))
     monkeypatch.setattr(pools.multiprocessing, "get_context", lambda kind: SimpleNamespace(Pipe=fail))
     with pytest.raises(
         WorkerError,
@@ -172,10 +166,7 @@ def test_a_system_that_starts_no_process_is_said_with_a_remedy(monkeypatch):
 
 @pytest.mark.parametrize("error", [ImportError("no NumPy"), OSError("no library"), MemoryError("no memory")])
 def test_a_worker_that_cannot_be_set_up_answers_with_the_reason(error):
-    def fail():
-        raise error
-
-    found = pools._error_of(fail)
+    found = pools._error_of(Mock(side_effect=error))
     assert isinstance(found, WorkerError)
     assert str(found) == f"a worker process cannot start: {error}; try fewer of them, with --jobs"
     assert pools._error_of(lambda: None) is None
