@@ -145,6 +145,14 @@ def interrupt_in(patch: Any, module: Any, name: str) -> None:
     patch.setattr(module, name, interrupted)
 
 
+def write_program(folder: Path) -> None:
+    """Put the program where a shell that looks into `bin` finds it."""
+    (folder / "bin").mkdir()
+    program = folder / "bin" / "rollcli"
+    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m rollcli "$@"\n')
+    program.chmod(0o755)
+
+
 def wait_until(condition: Callable[[], object], run: "subprocess.Popen[Any] | None" = None) -> None:
     """Wait for what another process brings about, or for the end of a run; fail after a minute."""
     give_up = time.monotonic() + 60

@@ -3,7 +3,6 @@
 import math
 import re
 import shutil
-import sys
 
 import cv2
 import numpy as np
@@ -12,7 +11,7 @@ import pytest
 from rollcli import estimate_roll, read_disparity
 from tests.readme_picture import MAP, PICTURE, picture
 from tests.readme_tables import OPTIONS_PAGE, with_tables
-from tests.run_cli import ROOT, ended, environment, rollcli
+from tests.run_cli import ROOT, ended, environment, rollcli, write_program
 
 README = (ROOT / "README.md").read_text("utf-8")
 PAGES = [
@@ -91,14 +90,6 @@ def made(tmp_path_factory):
 @pytest.fixture
 def pairs(tmp_path, made):
     return shutil.copytree(made, tmp_path, dirs_exist_ok=True)  # keeps the times of files
-
-
-def write_program(folder):
-    """Put the program where `make` looks for it."""
-    (folder / "bin").mkdir()
-    program = folder / "bin" / "rollcli"
-    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m rollcli "$@"\n')
-    program.chmod(0o755)
 
 
 def make(folder, target="rolls.html"):

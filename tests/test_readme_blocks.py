@@ -13,8 +13,17 @@ import pytest
 
 from rollcli import assess_rig
 from tests.readme_tables import commands
-from tests.run_cli import ROOT, contents, keep_rows, road_map, rollcli, rollcli_process, write_kitti
-from tests.test_readme import PAGES, README, make, needs_make, write_program
+from tests.run_cli import (
+    ROOT,
+    contents,
+    keep_rows,
+    road_map,
+    rollcli,
+    rollcli_process,
+    write_kitti,
+    write_program,
+)
+from tests.test_readme import PAGES, README, make, needs_make
 
 COMMANDS = dict(commands())
 BLOCKS = [text for _, text in re.findall(r"^```(\w*)\n(.*?)^```", README, flags=re.M | re.S)]

@@ -11,10 +11,9 @@ from rollcli.simulate.build import render_frame
 from rollcli.simulate.dataset import calibration
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import draw_specs
-from tests.estimator.synthetic_maps import banked_road
+from tests.estimator.synthetic_maps import banked_road, cast
 from tests.rig import calibration_files as samples
 from tests.rig.calibration_files import Rig
-from tests.rig.test_pose import cast
 from tests.run_cli import rollcli, rows_of, write_kitti, write_views
 
 RIG = Rig(fx=250.0, fy=250.0, cx=150.0, cy=90.0, baseline=0.5, width=320, height=200)

@@ -9,27 +9,18 @@ import pytest
 from rollcli.estimator.request import Request
 from rollcli.files.results import FURTHER, columns
 from rollcli.run.options import MethodOptions
+from tests.cli.test_main import output_and_loaded
 from tests.readme_tables import commands
-from tests.run_cli import ROOT, python, rollcli
+from tests.run_cli import ROOT, rollcli
 
 COMMANDS = dict(commands())
-HELP = """
-import sys
-sys.argv = ["rollcli", *{words}, "--help"]
-from rollcli.__main__ import main
-try:
-    main()
-except SystemExit:
-    pass
-print([name for name in "numpy cv2 tqdm tifffile plotly jinja2 dask".split() if name in sys.modules])
-"""
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_it_has_examples_and_statuses_and_loads_nothing_heavy(tmp_path, name):
-    done = python(HELP.format(words=name.split()), cwd=tmp_path, check=True)
-    *page, loaded = done.stdout.splitlines()
-    assert loaded == "[]"
+    heavy = "numpy cv2 tqdm tifffile plotly jinja2 dask"
+    *page, loaded = output_and_loaded(tmp_path, [*name.split(), "--help"], heavy)
+    assert loaded == "0 []"
     for heading in ("Running:", "Examples:", "Environment:", "Exit status:"):
         assert heading in page
     assert page[0].startswith(f"Usage: rollcli {name} ")

@@ -54,6 +54,23 @@ def test_help_leaves_two_of_a_hundred_columns_free_on_a_wide_screen(tmp_path):
     assert 90 < max(map(len, lines)) <= 98
 
 
+LOADS = """
+import sys
+sys.argv = ["rollcli", *{words}]
+from rollcli.__main__ import main
+try:
+    main()
+except SystemExit as end:
+    print(int(end.code or 0), [name for name in {names}.split() if name in sys.modules])
+"""
+
+
+def output_and_loaded(folder, words, names):
+    """What the program says, and in a last line its status and which of these modules it has loaded."""
+    done = python(LOADS.format(words=words, names=repr(names)), cwd=folder, check=True)
+    return done.stdout.splitlines()
+
+
 @pytest.mark.parametrize(
     ("arguments", "loaded"),
     [
@@ -64,17 +81,7 @@ def test_help_leaves_two_of_a_hundred_columns_free_on_a_wide_screen(tmp_path):
 )
 def test_neither_help_and_version_nor_a_dry_run_load_what_is_slow(tmp_path, arguments, loaded):
     write_maps(tmp_path / "maps", 2)
-    code = f"""
-import sys
-sys.argv = ["rollcli", *{arguments}]
-from rollcli.__main__ import main
-try:
-    main()
-except SystemExit as end:
-    print(int(end.code or 0), [name for name in {loaded.split()} if name in sys.modules])
-"""
-    done = python(code, cwd=tmp_path, check=True)
-    assert done.stdout.splitlines()[-1] == "0 []"
+    assert output_and_loaded(tmp_path, arguments, loaded)[-1] == "0 []"
 
 
 @pytest.mark.parametrize(

@@ -8,24 +8,40 @@ from hypothesis import strategies as st
 
 from rollcli.estimator.energy import Energy, Terms
 from rollcli.estimator.moments import map_moments
+from rollcli.rig.calibration import Calibration
 
 # the same examples each time, however busy the machine
 repeatable = settings(derandomize=True, max_examples=60, database=None)
 
 
-def flat_road(roll_deg, *, width=160, height=120, focal=140.0, pitch_deg=8.0, dtype=np.float64):
-    """Exact disparity of a flat road seen by a rolled and pitched rig; 0 above the horizon.
+def turned(roll, pitch):
+    """Axes of the camera (rows: right, down, forward) in a world of X right, Y down, Z forward."""
+    level = np.array(
+        [[1, 0, 0], [0, math.cos(pitch), -math.sin(pitch)], [0, math.sin(pitch), math.cos(pitch)]]
+    )
+    # a rig turned counter-clockwise seen from behind: its right axis goes up
+    own = np.array([[math.cos(roll), -math.sin(roll), 0], [math.sin(roll), math.cos(roll), 0], [0, 0, 1]])
+    return own @ level
 
-    The road's normal, in the camera's frame, is turned by the roll about the optical axis; depth along a
-    ray is height / (normal . ray), and disparity focal * baseline / depth.
-    """
-    roll, pitch = math.radians(roll_deg), math.radians(pitch_deg)
-    normal = np.array([-math.sin(roll) * math.cos(pitch), math.cos(roll) * math.cos(pitch), math.sin(pitch)])
-    v, u = np.mgrid[:height, :width]
-    ray = np.stack([(u - (width - 1) / 2) / focal, (v - (height - 1) / 2) / focal, np.ones(u.shape)])
-    baseline, camera_height = 0.3, 1.4
-    inverse_depth = np.tensordot(normal, ray, axes=1) / camera_height
-    return np.maximum(focal * baseline * inverse_depth, 0).astype(dtype)
+
+def cast(calibration, roll, pitch, height, shape=(200, 320)):
+    """Disparity of a level road by casting the ray of each pixel; 0 above the horizon."""
+    v, u = np.mgrid[: shape[0], : shape[1]].astype(float)
+    rays = np.stack(
+        [(u - calibration.cx) / calibration.fx, (v - calibration.cy) / calibration.fy, np.ones_like(u)], -1
+    )
+    down = (rays @ turned(roll, pitch))[..., 1]
+    with np.errstate(divide="ignore"):
+        depth = np.where(down > 1e-9, height / down, np.inf)
+    disparity = calibration.fx * calibration.baseline / depth - calibration.doffs
+    return np.where((disparity > 0) & np.isfinite(depth), disparity, 0)
+
+
+def flat_road(roll_deg, *, width=160, height=120, focal=140.0, pitch_deg=8.0, dtype=np.float64):
+    """Exact disparity of a flat road seen by a rolled and pitched rig 1.4 m above it; 0 above the horizon."""
+    rig = Calibration(focal, focal, (width - 1) / 2, (height - 1) / 2, baseline=0.3)
+    road = cast(rig, math.radians(roll_deg), math.radians(pitch_deg), 1.4, (height, width))
+    return road.astype(dtype)
 
 
 def bent_road(roll_deg, *, width=160, height=120, bend=0.002, noise=0.0, seed=0):

@@ -77,9 +77,8 @@ def test_runs_that_stopped_short_are_left_out_of_the_mean_and_counted(found):
     for name, more in (("mean", 2), ("min", 0), ("max", 4)):
         assert column(table, name, lambda0=26.0) == [counts[25] + more for counts in found.sweep]
     table = all_tables([found, short], [], [made_times(1)])["fig3_lambda0"]
-    assert column(table, "lambda0", delta_deg=DELTAS_DEG[0]) == list(
-        range(1, 101)
-    )  # the whole numbers that the command's help names
+    # the whole numbers that the command's help names
+    assert column(table, "lambda0", delta_deg=DELTAS_DEG[0]) == list(range(1, 101))
     (row,) = (each for each in table if (each["lambda0"], each["delta_deg"]) == (1.0, 0.0001))
     assert row["short"] == 1 + (found.sweep[-1][0] is None)
     assert row["mean"] == found.sweep[-1][0]

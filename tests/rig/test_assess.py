@@ -8,7 +8,7 @@ import pytest
 
 import rollcli
 from rollcli.rig.words import one_line
-from tests.rig.drive.series import drive
+from tests.rig.drive.series import drive, joined
 
 SCHEMA = make_dataclass("Row", ["file", "status", "roll_deg", "roll_ci95_deg"])
 
@@ -20,10 +20,6 @@ def columns(values, errors, *, folder="run/", status=None):
         "roll_deg": list(values),
         "roll_ci95_deg": list(1.96 * np.asarray(errors)),
     }
-
-
-def joined(*parts):
-    return {name: [value for part in parts for value in part[name]] for name in parts[0]}
 
 
 def test_rows_of_any_kind_give_the_same_answer():

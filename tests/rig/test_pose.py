@@ -11,32 +11,10 @@ from rollcli.estimator.interval import Tangent
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import pose_of, with_pose
 from rollcli.stereo.match import StereoOptions, match_pair
+from tests.estimator.synthetic_maps import cast
 from tests.real_pairs import STREETS, needs_streets
 
 WIDTH, HEIGHT = 320, 200
-
-
-def turned(roll, pitch):
-    """Axes of the camera (rows: right, down, forward) in a world of X right, Y down, Z forward."""
-    level = np.array(
-        [[1, 0, 0], [0, math.cos(pitch), -math.sin(pitch)], [0, math.sin(pitch), math.cos(pitch)]]
-    )
-    # a rig turned counter-clockwise seen from behind: its right axis goes up
-    own = np.array([[math.cos(roll), -math.sin(roll), 0], [math.sin(roll), math.cos(roll), 0], [0, 0, 1]])
-    return own @ level
-
-
-def cast(calibration, roll, pitch, height, shape=(HEIGHT, WIDTH)):
-    """Disparity of a level road by casting the ray of each pixel; 0 above the horizon."""
-    v, u = np.mgrid[: shape[0], : shape[1]].astype(float)
-    rays = np.stack(
-        [(u - calibration.cx) / calibration.fx, (v - calibration.cy) / calibration.fy, np.ones_like(u)], -1
-    )
-    down = (rays @ turned(roll, pitch))[..., 1]
-    with np.errstate(divide="ignore"):
-        depth = np.where(down > 1e-9, height / down, np.inf)
-    disparity = calibration.fx * calibration.baseline / depth - calibration.doffs
-    return np.where((disparity > 0) & np.isfinite(depth), disparity, 0)
 
 
 def random_rig(rng, *, square=True):

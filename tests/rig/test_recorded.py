@@ -20,7 +20,7 @@ from rollcli.rig.words import answer, counts, drift_in_words, findings, now_in_w
 from tests.estimator.synthetic_maps import bent_road
 from tests.recorded import made, recorded_test
 from tests.rig import calibration_files as files
-from tests.rig.drive.series import drive
+from tests.rig.drive.series import drive, joined
 
 SERIES = {
     "brief": lambda: drive(1, 40),
@@ -76,8 +76,8 @@ RIGS = {
         "a drift", "m.mcap#/left@", lambda place: 1403636579763555584 + place * 10**10
     ),
     "few": lambda: _columns("seven"),
-    "two drives": lambda: _joined(_columns("brief", "a/1/"), _columns("brief and other", "b/2/")),
-    "many small": lambda: _joined(
+    "two drives": lambda: joined(_columns("brief", "a/1/"), _columns("brief and other", "b/2/")),
+    "many small": lambda: joined(
         *({key: each[k : k + 9] for key, each in _columns("white", f"{k}/").items()} for k in range(0, 90, 9))
     ),
     "nothing": lambda: _columns("nothing"),
@@ -110,10 +110,6 @@ def _split(groups):
         files = [f"{folder}/{place}.png".removeprefix("./") for place, folder in frames]
         found[name] = made(split_drives, files, groups)
     return found
-
-
-def _joined(*parts):
-    return {name: [value for part in parts for value in part[name]] for name in parts[0]}
 
 
 def _rig(name, **options):

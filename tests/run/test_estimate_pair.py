@@ -13,6 +13,7 @@ from rollcli.simulate.spec import FrameSpec
 from tests.odd_views import seen_by
 from tests.run_cli import rollcli, rows_of, write_views
 
+VIEWS = ("--left", "left", "--right", "right")
 CAMERA = "P{}: {f} 0 {x} {} 0 {f} {y} 0 0 0 1 0\n"
 
 
@@ -39,12 +40,9 @@ def row_of(folder, *inputs):
 @pytest.mark.parametrize("form", ["png", "tiff"])
 def test_a_pair_and_its_map_give_the_same_row(pair, form):
     folder, _, _ = pair
-    of_pair = row_of(folder, "--left", "left", "--right", "right")
+    of_pair = row_of(folder, *VIEWS)
     out = f"maps-{form}"
-    done = rollcli(
-        "disparity", "--left", "left", "--right", "right", "-o", out, "--save-as", form, cwd=folder
-    )
-    assert done.status == 0
+    assert rollcli("disparity", *VIEWS, "-o", out, "--save-as", form, cwd=folder).status == 0
     of_map = row_of(folder, out)
 
     assert float(of_pair["roll_ci95_deg"]) > 0.03  # of which levelling is the most
@@ -58,9 +56,8 @@ def test_a_pair_and_its_map_give_the_same_row(pair, form):
 
 def test_a_map_that_is_turned_upright_keeps_what_levelling_left_open(pair):
     folder, _, _ = pair
-    views = ("--left", "left", "--right", "right")
-    of_pair = row_of(folder, *views, "--derotated", "upright")
-    assert rollcli("disparity", *views, "-o", "maps", cwd=folder).status == 0
+    of_pair = row_of(folder, *VIEWS, "--derotated", "upright")
+    assert rollcli("disparity", *VIEWS, "-o", "maps", cwd=folder).status == 0
     assert rollcli("derotate", "maps", "--roll", of_pair["roll_deg"], "-o", "turned", cwd=folder).status == 0
 
     for turned in ("upright", "turned"):
@@ -72,7 +69,7 @@ def test_a_map_that_is_turned_upright_keeps_what_levelling_left_open(pair):
 
 def test_the_call_says_what_the_command_does(pair):
     folder, left, right = pair
-    row = row_of(folder, "--left", "left", "--right", "right")
+    row = row_of(folder, *VIEWS)
 
     found = package.estimate_pair(left, right, calibration=package.read_calibration(folder / "calib.txt"))
 
@@ -92,7 +89,7 @@ def test_the_row_says_where_no_road_was_matched_along_its_plane(pair, tmp_path):
         view[-len(board) :, first : first + board.shape[1]] = board
     write_views(tmp_path, "road.png", *views)
     write_views(tmp_path, "hidden.png", *hidden)
-    rows = rows_of(rollcli("estimate", "--left", "left", "--right", "right", cwd=tmp_path).out)
+    rows = rows_of(rollcli("estimate", *VIEWS, cwd=tmp_path).out)
     says = "matched over the whole range, as too little road was found to match along"
     assert [says in row["message"] for row in rows] == [True, False]
 

@@ -10,7 +10,7 @@ import pytest
 
 from rollcli.files.results import parse_rows
 from rollcli.run.result_file import whole_rows
-from tests.run_cli import command, contents, ended, environment, estimated, rollcli, started, wait_until
+from tests.run_cli import contents, ended, environment, estimated, rollcli, started, wait_until, write_program
 from tests.slow import mostly_slow
 
 FRAMES = 40
@@ -82,14 +82,11 @@ def test_ctrl_c_keeps_what_is_done_and_prints_the_command_that_resumes(undisturb
 
 @pytest.mark.slow
 def test_the_command_that_resumes_can_be_pasted_whatever_its_words_are(undisturbed, tmp_path):
-    program = tmp_path / "bin" / "rollcli"
-    program.parent.mkdir()
-    program.write_text(f'#!/bin/sh\nexec {shlex.join(command())} "$@"\n')
-    program.chmod(0o755)
+    write_program(tmp_path)
     folder = '-it\'s "mine"'
     (tmp_path / folder).symlink_to(undisturbed / "maps")
     (tmp_path / "a b.toml").write_text("overwrite = true\nseed = 3\n")
-    path = os.pathsep.join([str(program.parent), os.environ["PATH"]])
+    path = os.pathsep.join([str(tmp_path / "bin"), os.environ["PATH"]])
     settings = {"ROLLCLI_ESTIMATE_INVALID": "5 6", "ROLLCLI_ESTIMATE_TIMING": "0"}
     run = started(
         *("estimate", "-o", "my rolls.csv", "--config", "a b.toml", "--", folder),

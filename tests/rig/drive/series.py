@@ -34,3 +34,8 @@ def drive(
     bad = rng.random(frames) < gross
     values[bad] = rng.uniform(0, 30, bad.sum())
     return values, own
+
+
+def joined(*parts):
+    """Columns below each other."""
+    return {name: [value for part in parts for value in part[name]] for name in parts[0]}
