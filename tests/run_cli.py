@@ -161,6 +161,11 @@ def wait_until(condition: Callable[[], object], run: "subprocess.Popen[Any] | No
         time.sleep(0.002)
 
 
+def wait_for_files(folder: Path, pattern: str, count: int, run: "subprocess.Popen[Any]") -> None:
+    """Wait until so many whole files are there."""
+    wait_until(lambda: len(list(folder.glob(pattern))) >= count, run)
+
+
 def keep_rows(path: Path, count: int, further: int = 0) -> bytes:
     """Cut a result behind its header and some rows, or bytes of a further one; return what it was."""
     whole = path.read_bytes()

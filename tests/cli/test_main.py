@@ -4,6 +4,7 @@ import importlib.metadata as metadata
 import itertools
 import re
 from importlib.metadata import PackageNotFoundError
+from unittest.mock import Mock
 
 import pytest
 
@@ -41,10 +42,7 @@ def test_a_package_that_is_missing_is_named_as_such(tmp_path, monkeypatch):
 
 
 def test_versions_ends_with_pythons_where_rollcli_was_not_installed(tmp_path, monkeypatch):
-    def requires(name):
-        raise PackageNotFoundError(name)
-
-    monkeypatch.setattr(metadata, "requires", requires)
+    monkeypatch.setattr(metadata, "requires", Mock(side_effect=PackageNotFoundError("rollcli")))
     names = [line.split()[0] for line in rollcli("--versions", cwd=tmp_path).out.splitlines()]
     assert names == ["rollcli", "Python"]
 

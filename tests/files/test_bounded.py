@@ -42,10 +42,7 @@ def sparse(path, size, start=b""):
     return path
 
 
-needs_devices = pytest.mark.skipif(not Path("/dev/zero").exists(), reason="needs /dev/zero")
-
-
-@needs_devices
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="needs /dev/zero")
 @pytest.mark.parametrize(
     "words",
     [

@@ -69,13 +69,10 @@ def test_a_tar_gives_what_unpacking_it_would(tmp_path):
     with tarfile.open(tmp_path / "x.tar", "w") as file:
         for number in range(2):
             file.add(tmp_path / f"{number}.png", "a.png")
-        for name, kind in (
-            ("b.png", tarfile.LNKTYPE),
-            ("c.png", tarfile.SYMTYPE),
-            ("d.png", tarfile.SYMTYPE),
-        ):
+        for name, target in {"b.png": "a.png", "c.png": "a.png", "d.png": "c.png"}.items():
             link = tarfile.TarInfo(name)
-            link.type, link.linkname = kind, "c.png" if name == "d.png" else "a.png"
+            link.type = tarfile.LNKTYPE if name == "b.png" else tarfile.SYMTYPE
+            link.linkname = target
             file.addfile(link)
     found = rows_of(rollcli("estimate", "x.tar", cwd=tmp_path).out)
     assert [row["file"] for row in found] == [f"x.tar#{name}.png" for name in "abcd"]

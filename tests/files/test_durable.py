@@ -4,6 +4,7 @@ import errno
 import os
 import stat
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -48,10 +49,7 @@ def test_a_durable_file_has_its_bytes_on_the_disk_before_it_has_its_name(tmp_pat
 def test_a_disk_that_fails_is_said_in_one_line(tmp_path, monkeypatch):
     write_atomic(tmp_path / "map.png", b"data")
 
-    def fail(descriptor):
-        raise OSError(errno.EIO, os.strerror(errno.EIO))
-
-    monkeypatch.setattr(os, "fsync", fail)
+    monkeypatch.setattr(os, "fsync", Mock(side_effect=OSError(errno.EIO, os.strerror(errno.EIO))))
 
     with pytest.raises(OutputError, match=r"map\.png: cannot be forced to the disk: input/output error$"):
         sync_files([tmp_path / "map.png"])

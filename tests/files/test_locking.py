@@ -6,6 +6,7 @@ import os
 import sys
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 
@@ -28,11 +29,7 @@ def result(tmp_path):
 @pytest.fixture
 def without_locks(monkeypatch):
     """A file system that has none."""
-
-    def fail(descriptor, operation):
-        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
-
-    monkeypatch.setattr(fcntl, "flock", fail)
+    monkeypatch.setattr(fcntl, "flock", Mock(side_effect=OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))))
 
 
 def test_without_locks_a_lock_file_keeps_a_second_run_away_and_that_is_said(result, without_locks, capsys):

@@ -5,6 +5,7 @@ import errno
 import os
 import sys
 import threading
+from unittest.mock import Mock
 
 import pytest
 
@@ -49,9 +50,6 @@ def test_a_reader_that_has_gone_is_told_from_an_error(pipe, monkeypatch):
     with pytest.raises(BrokenPipeError):
         storage.write_stream(writes, b"data", "/dev/x")
 
-    def fail(descriptor, data):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(os, "write", fail)
+    monkeypatch.setattr(os, "write", Mock(side_effect=OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))))
     with pytest.raises(OutputError, match=r"^/dev/x: cannot be written: no space left on device$"):
         storage.write_stream(writes, b"data", "/dev/x")

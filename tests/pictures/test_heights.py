@@ -12,6 +12,7 @@ from rollcli.rig.calibration import Calibration
 
 WIDTH, HEIGHT = 640, 240
 CENTRE = (WIDTH - 1) / 2, (HEIGHT - 1) / 2
+V, U = np.mgrid[:HEIGHT, :WIDTH].astype(float)
 
 
 def road_of(theta, level, rise, bend, camber):
@@ -85,8 +86,7 @@ def test_heights_are_the_distances_from_the_nearest_points_of_the_surface(seed):
 def test_far_above_a_plane_heights_are_exact_and_need_no_calibration():
     rig = Calibration(fx=400, fy=400, cx=CENTRE[0], cy=CENTRE[1], baseline=0.5)
     road, model = road_of(0.2, 30, 0.4, 0, 0)
-    v, u = np.mgrid[:HEIGHT, :WIDTH].astype(float)
-    g = model.disparity(u - CENTRE[0], v - CENTRE[1])
+    g = model.disparity(U - CENTRE[0], V - CENTRE[1])
     d = np.where(g > 5, g * 2.5, 0)
     in_heights = heights_over(d, road, None)
     assert np.allclose(in_heights[d > 0], 1 - 1 / 2.5, atol=1e-5)
@@ -107,8 +107,7 @@ def test_a_flattening_road_goes_on_straight():
 def road_over_a_hill(theta):
     """Disparities and distances of a road that falls by 0.0015 z^2 m, and the rig: no parabola fits it."""
     rig = Calibration(fx=400, fy=400, cx=CENTRE[0], cy=CENTRE[1], baseline=0.5)
-    v, u = np.mgrid[:HEIGHT, :WIDTH].astype(float)
-    along = (v - CENTRE[1]) * math.cos(theta) - (u - CENTRE[0]) * math.sin(theta)
+    along = (V - CENTRE[1]) * math.cos(theta) - (U - CENTRE[0]) * math.sin(theta)
     sight = along / rig.fy + 0.1  # a pitch of 0.1, as a shift
     root = np.sqrt(np.maximum(sight**2 - 0.009, 0))
     depth = np.where(sight > 0.11, 3 / (sight + root), np.inf)  # the road is 1.5 m below the camera
@@ -122,8 +121,7 @@ def test_a_hill_that_no_parabola_fits_is_level_and_a_dip_in_it_as_deep_as_it_is(
     seen = np.where(d > 0, d + rng.normal(0, 0.05, d.shape), 0)
     estimate = rollcli.estimate_roll(seen, calibration=rig)
     flat = rollcli.height_map(seen, estimate, rig)
-    v, u = np.mgrid[:HEIGHT, :WIDTH].astype(float)
-    across = (u - CENTRE[0]) * math.cos(theta) + (v - CENTRE[1]) * math.sin(theta)
+    across = (U - CENTRE[0]) * math.cos(theta) + (V - CENTRE[1]) * math.sin(theta)
     with np.errstate(invalid="ignore"):
         across *= depth / rig.fx
     for near, far in ((5, 8), (8, 12), (12, 18)):  # the parabola alone leaves 0.5, 2 and 45 mm

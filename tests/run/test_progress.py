@@ -13,27 +13,15 @@ from rollcli.run.frame import Frame, failed_frame
 from rollcli.run.options import EncodingOptions, RunningOptions
 from rollcli.run.progress import Progress, RunSummary, TaskProgress
 
-GUESSED = EncodingOptions()
-
-
-def progress(total=3, encoding=GUESSED, **running):
-    return Progress(total, RunningOptions(**running), encoding)
-
-
 MAP = Frame("a.png", "", "a.png", "", "a.png", None)
 
 
-@pytest.fixture
-def lines(capsys):
-    return lambda: capsys.readouterr().err.splitlines()
-
-
-def test_of_many_causes_the_first_five_are_said(lines):
-    counted = progress(quiet=True)
+def test_of_many_causes_the_first_five_are_said(capsys):
+    counted = Progress(3, RunningOptions(quiet=True), EncodingOptions())
     for cause in "abcdefg":
         counted.add(failed_frame(MAP, cause, cause))
     counted.tell_end()
-    assert lines() == [
+    assert capsys.readouterr().err.splitlines() == [
         *(f"rollcli: a.png: {cause}" for cause in "abcde"),
         "rollcli: 2 further frames: other causes, which -v names",
     ]

@@ -12,6 +12,7 @@ from rollcli.run.read import region_mask, road_finder
 from tests.run_cli import rollcli, write_kitti, write_maps
 
 SHAPE = (120, 160)
+V, U = np.mgrid[: SHAPE[0], : SHAPE[1]]
 
 
 def allowed(*corners):
@@ -22,21 +23,18 @@ def allowed(*corners):
 
 @pytest.mark.parametrize("far", [1e4, 1e6])
 def test_a_polygon_may_reach_far_out_of_the_map(far):
-    v, u = np.mgrid[: SHAPE[0], : SHAPE[1]]
-
     assert allowed((-far, -far), (far, -far), (far, far), (-far, far)).all()
-    np.testing.assert_array_equal(allowed((80, -far), (far, -far), (far, far), (80, far)), u >= 80)
-    np.testing.assert_array_equal(allowed((-far, 60), (far, 60), (far, far), (-far, far)), v >= 60)
+    np.testing.assert_array_equal(allowed((80, -far), (far, -far), (far, far), (80, far)), U >= 80)
+    np.testing.assert_array_equal(allowed((-far, 60), (far, 60), (far, far), (-far, far)), V >= 60)
 
 
 @pytest.mark.parametrize("far", [1e4, 1e6])
 def test_a_slanted_side_that_reaches_far_keeps_its_place(far):
-    v, u = np.mgrid[: SHAPE[0], : SHAPE[1]]
     found = allowed((-far, -far), (far, far), (-far, far))
 
-    assert found[v > u].all()
-    assert not found[v < u].any()
-    np.testing.assert_array_equal(allowed((0, 0), (far, 0), (far, far)), v <= u)
+    assert found[V > U].all()
+    assert not found[V < U].any()
+    np.testing.assert_array_equal(allowed((0, 0), (far, 0), (far, far)), V <= U)
 
 
 def test_of_a_pair_the_road_is_found_in_the_region():
@@ -68,9 +66,8 @@ def test_masks_in_an_archive_are_those_of_a_folder(tmp_path):
 
 
 def test_what_is_no_number_in_a_mask_is_not_used(tmp_path):
-    v, _ = np.mgrid[: SHAPE[0], : SHAPE[1]]
-    values = np.where(v > 30, -1.0, np.where(v > 10, np.nan, 0))
+    values = np.where(V > 30, -1.0, np.where(V > 10, np.nan, 0))
     np.save(tmp_path / "mask.npy", values)
     found = region_mask(str(tmp_path / "mask.npy"), FrameOptions(), SHAPE)
-    np.testing.assert_array_equal(found, v > 30)
-    np.testing.assert_array_equal(usable_of(values), v > 30)
+    np.testing.assert_array_equal(found, V > 30)
+    np.testing.assert_array_equal(usable_of(values), V > 30)

@@ -2,7 +2,6 @@
 
 import os
 import shutil
-from functools import partial
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -20,7 +19,7 @@ from tests.run_cli import (
     road_map,
     rollcli,
     started,
-    wait_until,
+    wait_for_files,
     write_kitti,
     write_maps,
 )
@@ -104,10 +103,6 @@ def test_a_retry_that_is_interrupted_keeps_what_it_has_done_and_is_taken_up_agai
     assert_is_as_anew(folder, line)
 
 
-def made_at_least(folder, count):
-    return len(list(folder.glob("up/[!.]*.png"))) >= count
-
-
 @pytest.mark.slow
 def test_a_retry_killed_at_any_time_loses_no_row_and_is_taken_up_again(tmp_path):
     for index in range(COUNT):
@@ -120,7 +115,7 @@ def test_a_retry_killed_at_any_time_loses_no_row_and_is_taken_up_again(tmp_path)
             disparity = road_map(0.01 * index, width=300, height=200, seed=seed)
             write_kitti(tmp_path / "maps" / f"frame{index:02}.png", disparity)
         run = started(*line, *RETRY, "-j", "2", cwd=tmp_path, stderr=None)
-        wait_until(partial(made_at_least, tmp_path, count), run)
+        wait_for_files(tmp_path, "up/[!.]*.png", count, run)
         run.kill()
         run.wait()
         rows = (tmp_path / "rolls.csv").read_text().splitlines()[1:]

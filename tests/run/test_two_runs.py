@@ -16,6 +16,8 @@ from rollcli.run.workers.chunks import Span
 from tests.run.rigs import options_of
 from tests.run_cli import contents, rollcli, write_maps
 
+ANOTHER = "another run has begun to write this result"
+
 
 @pytest.fixture
 def plan(bucket, tmp_path):
@@ -35,7 +37,7 @@ def append(output, frames, first=0):
 def test_of_two_runs_in_a_bucket_the_last_to_begin_goes_on_and_the_other_ends(bucket, plan):
     with open_output(plan) as first, open_output(plan) as last:
         append(first, plan.frames[:1])
-        with pytest.raises(UsageError, match="another run has begun to write this result"):
+        with pytest.raises(UsageError, match=ANOTHER):
             append(first, plan.frames[1:], 1)
         append(last, plan.frames)
         summary = RunSummary()
@@ -55,10 +57,7 @@ def test_a_run_whose_rows_come_slowly_looks_now_and_then(plan, monkeypatch):
     monkeypatch.setattr("rollcli.run.parts._CHECK_S", 0.0)
     with open_output(plan) as first:
         append(first, plan.frames[:1])
-        with (
-            open_output(plan),
-            pytest.raises(UsageError, match="another run has begun to write this result"),
-        ):
+        with open_output(plan), pytest.raises(UsageError, match=ANOTHER):
             append(first, plan.frames[1:2], 1)  # the part is not full
 
 

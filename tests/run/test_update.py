@@ -1,6 +1,7 @@
 """A result is updated to the bytes of a run on the inputs as they are; identical bytes count as unchanged."""
 
 import os
+from unittest.mock import Mock
 
 import pytest
 
@@ -114,12 +115,8 @@ def test_an_update_does_what_has_changed_and_nothing_else(folder, tmp_path_facto
 def test_a_frame_without_a_row_of_its_own_stands_as_an_error_until_it_is_done(folder, monkeypatch):
     put(folder, "frame0a")
     put(folder, "frame1", roll=0.3)
-
-    def fail(*_):
-        raise KeyboardInterrupt
-
     with monkeypatch.context() as patch:
-        patch.setattr("rollcli.run.estimate.run_joined", fail)
+        patch.setattr("rollcli.run.estimate.run_joined", Mock(side_effect=KeyboardInterrupt))
         estimate(folder, *IMAGES, "--update", status=3)
     rows = (folder / "rolls.csv").read_text().splitlines()
     assert rows[2].startswith("maps/frame0a.png,,error")
@@ -132,12 +129,6 @@ def test_a_frame_without_a_row_of_its_own_stands_as_an_error_until_it_is_done(fo
     assert "not estimated yet" not in (folder / "rolls.csv").read_text()
 
 
-def _noted(paths, read):
-    for path in paths:
-        read.append(path)
-        yield path
-
-
 def test_objects_are_compared_by_their_tags(tmp_path, bucket, monkeypatch):
     write_maps(tmp_path / "maps", 4)
     folder = f"{bucket}/update"
@@ -148,6 +139,8 @@ def test_objects_are_compared_by_their_tags(tmp_path, bucket, monkeypatch):
     write_bytes(f"{folder}/frame2.png", (tmp_path / "maps" / "frame2.png").read_bytes())
     read = []
     really = result_file._read
-    monkeypatch.setattr(result_file, "_read", lambda paths: really(_noted(paths, read)))
+    monkeypatch.setattr(
+        result_file, "_read", lambda paths: really(read.append(path) or path for path in paths)
+    )
     assert "(3 kept)" in estimate(tmp_path, "--update", **line).err
     assert read == [f"{folder}/frame2.png"]

@@ -2,7 +2,6 @@
 
 import random
 import signal
-from functools import partial
 from itertools import accumulate
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from rollcli.run.options import FrameOptions, ResultOptions
 from rollcli.run.result_file import inputs_line
 from rollcli.run.workers.chunks import Chunks, Done, Span, Work
 from tests.object_store import joined
-from tests.run_cli import contents, estimated, rollcli, started, wait_until, write_maps
+from tests.run_cli import contents, estimated, rollcli, started, wait_for_files, write_maps
 from tests.slow import mostly_slow
 
 KITTI = ReadAs(frozenset(["kitti"]))
@@ -172,7 +171,7 @@ def test_runs_that_are_stopped_and_killed_end_in_the_parts_of_an_undisturbed_one
     while status != 0:
         run = started(*line, "--resume", "-q", cwd=tmp_path / "disturbed")
         end = len(list(parts.glob("part-*"))) + chance.randint(5, 30)
-        wait_until(partial(lambda end: len(list(parts.glob("part-*"))) >= end, end), run)
+        wait_for_files(parts, "part-*", end, run)
         run.send_signal(chance.choice([signal.SIGKILL, signal.SIGTERM, signal.SIGINT]))
         _, said = run.communicate(timeout=60)
         status = run.returncode

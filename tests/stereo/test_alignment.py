@@ -125,10 +125,8 @@ def test_a_level_pair_is_left_as_it_is(frame, downscale):
 
     assert match.corrected == LEVEL
     assert match.doubt == ""
-    count = match.num_disparities
-    off = match_pair(
-        frame.left, frame.right, StereoOptions(align="off", num_disparities=count, downscale=downscale)
-    )
+    options = StereoOptions(align="off", num_disparities=match.num_disparities, downscale=downscale)
+    off = match_pair(frame.left, frame.right, options)
     np.testing.assert_array_equal(match.disparity, off.disparity)
 
 

@@ -266,9 +266,8 @@ def plane(roll_deg, horizon, shape=(110, 146), slope=0.2):
     v, u = np.indices(shape)
     roll = math.radians(roll_deg)
     across = u - (shape[1] - 1) / 2
-    return np.maximum(0, slope * ((v - horizon) * math.cos(roll) - across * math.sin(roll))).astype(
-        np.float32
-    )
+    along = (v - horizon) * math.cos(roll) - across * math.sin(roll)
+    return np.maximum(0, slope * along).astype(np.float32)
 
 
 @pytest.mark.parametrize("roll_deg", [-30, -8, 0, 3, 20])

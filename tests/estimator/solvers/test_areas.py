@@ -160,9 +160,8 @@ def test_it_is_the_least_squares_plane_and_says_its_error():
     design = np.stack([np.ones(len(u)), u, v], axis=1)
     plane, squares, *_ = np.linalg.lstsq(design, disparity[v, u], rcond=None)
     assert found.theta == pytest.approx(math.atan(-plane[1] / plane[2]), abs=1e-9)
-    assert energy.rmse(energy.at(found.theta).value) == pytest.approx(
-        math.sqrt(squares[0] / len(u)), rel=1e-6
-    )
+    rmse = math.sqrt(squares[0] / len(u))
+    assert energy.rmse(energy.at(found.theta).value) == pytest.approx(rmse, rel=1e-6)
 
 
 def test_an_area_without_pixels_is_refused_with_the_reason():

@@ -2,7 +2,6 @@
 
 import os
 import signal
-from functools import partial
 
 import cv2
 import numpy as np
@@ -11,7 +10,8 @@ import pytest
 from tests.files.recordings.bag_files import image, write_bag
 from tests.files.recordings.test_bags import START, STEP, maps
 from tests.files.recordings.test_video import write_video
-from tests.run_cli import road_map, rollcli, started, wait_until, write_pair
+from tests.run.test_resume import wait_for_rows
+from tests.run_cli import road_map, rollcli, started, write_pair
 
 COUNT = 240
 pytestmark = [
@@ -43,10 +43,6 @@ def write_views(folder):
     return ["drive.avi", "--side-by-side"]
 
 
-def has_rows(result, least):
-    return result.exists() and result.read_bytes().count(b"\n") > least
-
-
 @pytest.mark.parametrize(("write", "rows"), [(write_maps, COUNT), (write_views, COUNT // 4)])
 def test_a_run_over_a_recording_killed_again_and_again_ends_in_the_same_bytes(tmp_path, write, rows):
     given = [*write(tmp_path), "-j", "2"]
@@ -55,7 +51,7 @@ def test_a_run_over_a_recording_killed_again_and_again_ends_in_the_same_bytes(tm
     for least in (1, rows // 3, rows * 2 // 3):
         line = ("estimate", *given, "-q", "-o", "rolls.csv", *(["--resume"] if least > 1 else []))
         run = started(*line, cwd=tmp_path, stderr=None, start_new_session=True)
-        wait_until(partial(has_rows, result, least), run)
+        wait_for_rows(tmp_path, least, run)
         os.killpg(run.pid, signal.SIGKILL)
         run.wait()
     done = rollcli("estimate", *given, "-o", "rolls.csv", "--resume", cwd=tmp_path)
