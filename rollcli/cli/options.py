@@ -210,7 +210,7 @@ heights_range_option = option(
     "--heights-range",
     WIDE_SPAN,
     Needs(
-        lambda ctx: ctx.params.get("preview") or ctx.params.get("heights_preview"),
+        lambda ctx: any(ctx.params.get(each) for each in ("preview", "heights_preview")),
         "only previews of heights have colours",
     ),
     text="Heights with the outermost colours of a preview, A:B, metres or camera heights.",
