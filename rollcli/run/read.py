@@ -296,12 +296,14 @@ def road_finder(allowed: NDArray[np.bool_] | None, request: Request) -> "FindRoa
     return partial(_road, allowed, request) if request.road == "auto" else None
 
 
-def _road(allowed: NDArray[np.bool_] | None, request: Request, small: NDArray[Any]) -> Plane | None:
-    """Return the plane of the road that a small map shows in the region."""
+def _road(
+    allowed: NDArray[np.bool_] | None, request: Request, small: NDArray[Any], smaller: float
+) -> Plane | None:
+    """Return the plane of the road that a smaller map shows in the region."""
     if allowed is not None:
         v, u = (np.arange(few) * many // few for few, many in zip(small.shape, allowed.shape, strict=True))
         allowed = allowed[v[:, None], u]
-    return road_plane(small, allowed, request)
+    return road_plane(small, smaller, allowed, request)
 
 
 def _doubt_of_range(match: "StereoMatch") -> str:

@@ -31,8 +31,8 @@ from rollcli.stereo.views import (
     smoothed_at_pixels,
 )
 
-FindRoad = Callable[[Map], Plane | None]
-"""Finds the road's plane in a small map; None where there is none."""
+FindRoad = Callable[[Map, float], Plane | None]
+"""Finds the road's plane in a map that is so many times smaller; None where there is none."""
 
 _SMALLER = 3  # times: what need not be matched at full size takes a 27th of the time
 # px: lower views show too little of the road at a third of the size. Of 18 real streets of 621x188, two lost
@@ -76,6 +76,8 @@ class Levelled:
         None: nothing is matched along a road.
     blank : ndarray of bool, shape (H, W), or None
         Pixels of the left view that show nothing: what a match finds there is no data.
+    before : Levelled or None
+        The pair as it was matched before. Where it lay nearly so, its small map and plane serve again.
     """
 
     views: Views
@@ -86,6 +88,7 @@ class Levelled:
     options: StereoOptions
     find_road: FindRoad | None
     blank: NDArray[np.bool_] | None = None
+    before: "Levelled | None" = None
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -99,6 +102,13 @@ class Levelled:
         return seen_from_right(self.seen) if self.seen is not None and self.lies.tilt else None
 
     @cached_property
+    def _alike(self) -> "Levelled | None":
+        """The match before; None where the views lay further off than half a pixel of the small map."""
+        if self.before is None or (self.lies - self.before.lies).reach(*self.shape) > _SMALLER / 2:
+            return None
+        return self.before
+
+    @cached_property
     def whole(self) -> Views:
         """Both views at their size."""
         return self.views[0], level(self.views[1], self.lies, self._near)
@@ -106,6 +116,8 @@ class Levelled:
     @cached_property
     def _small(self) -> Map | None:
         """The map at a third of the size; None where it would be too narrow."""
+        if self._alike is not None:
+            return self._alike._small
         left, right = shrink_both(self.views, _SMALLER)
         views = left, level(right, self.lies.resized(1 / _SMALLER), self._near)
         first, width = self.first // _SMALLER, -(-self.count // _SMALLER)
@@ -121,9 +133,11 @@ class Levelled:
     @cached_property
     def plane(self) -> Plane | None:
         """The road's; None where there is none, or nothing finds it."""
+        if self._alike is not None:
+            return self._alike.plane
         if self.find_road is None or self._small is None:
             return None
-        found = self.find_road(self._small)
+        found = self.find_road(self._small, _SMALLER)
         return None if found is None else _resized(found, self._small.shape, self.shape)
 
     @cached_property

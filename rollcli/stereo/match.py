@@ -239,7 +239,7 @@ def match_pair(
     left, right, options
         See `compute_disparity`.
     find_road : callable, optional
-        Finds the road's plane in a small map of the pair. The road is then matched along it, and what lies
+        Finds the road's plane in a smaller map of the pair. The road is then matched along it, and what lies
         beside and above it at a third of the size; without it all is matched at full size.
 
     Raises
@@ -263,12 +263,12 @@ def match_pair(
     count = usable_range(count, first, width, options.block_size)
 
     blank, find_road = shows_nothing(views[0]), find_road if first >= 0 else None
-    pair: Levelled
+    tried: list[Levelled] = []
 
     def match(lies: Misalignment) -> Map:
-        nonlocal pair
-        pair = Levelled(views, lies, look.disparity, first, count, options, find_road, blank)
-        return pair.matched()
+        before = tried[-1] if tried else None
+        tried.append(Levelled(views, lies, look.disparity, first, count, options, find_road, blank, before))
+        return tried[-1].matched()
 
     support, doubt = None, ""
     if options.measures_alignment:
@@ -285,6 +285,7 @@ def match_pair(
                 corrected = told.of_pair(lies.offset, errors.offset).rounded(*views[0].shape)
             else:
                 doubt = CONTRADICTS
+    pair = tried[-1]
     if corrected == LEVEL:
         support = NOTHING_KNOWN
     elif support is None:

@@ -83,7 +83,7 @@ def test_the_call_says_what_the_command_does(pair):
 def test_the_row_says_where_no_road_was_matched_along_its_plane(pair, tmp_path):
     _, *views = pair
     height, width = views[0].shape
-    board = np.random.default_rng(0).integers(0, 256, (9 * height // 20, width - 140), dtype=np.uint8)
+    board = np.random.default_rng(0).integers(0, 256, (2 * height // 5, width - 140), dtype=np.uint8)
     hidden = [view.copy() for view in views]
     for view, first in zip(hidden, (100, 40), strict=True):  # nearer than most of the road
         view[-len(board) :, first : first + board.shape[1]] = board

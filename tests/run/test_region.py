@@ -43,10 +43,10 @@ def test_of_a_pair_the_road_is_found_in_the_region():
     v, u = np.mgrid[:60, :80]
     left, right = 10 + 0.5 * v - 0.1 * u, 12 + 0.4 * v + 0.05 * u
     small = np.where(u < 41, left, right)
-    assert find_road(small) == pytest.approx((12, 0.05, 0.4), abs=1e-3)
+    assert find_road(small, 1) == pytest.approx((12, 0.05, 0.4), abs=1e-3)
     small[v < 15] = small[v >= 50] = 0  # nothing in the region is no data
-    assert find_road(small) == pytest.approx((12, 0.05, 0.4), abs=1e-3)
-    assert find_road(np.where(u < 41, left, 0)) is None
+    assert find_road(small, 1) == pytest.approx((12, 0.05, 0.4), abs=1e-3)
+    assert find_road(np.where(u < 41, left, 0), 1) is None
 
 
 def test_masks_in_an_archive_are_those_of_a_folder(tmp_path):

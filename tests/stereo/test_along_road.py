@@ -128,7 +128,7 @@ def test_a_right_view_that_is_out_of_place_is_levelled_on_the_way(street, road, 
     ],
 )
 def test_along_a_plane_that_is_no_road_nothing_is_matched(street, whole, wrong):
-    found = match_pair(street.left, street.right, StereoOptions(), lambda small: wrong)
+    found = match_pair(street.left, street.right, StereoOptions(), lambda *_: wrong)
     below = np.s_[300:]
     both = (found.disparity[below] > 0) & (whole.disparity[below] > 0)
     assert both.sum() > 0.98 * (whole.disparity[below] > 0).sum()
@@ -137,7 +137,7 @@ def test_along_a_plane_that_is_no_road_nothing_is_matched(street, whole, wrong):
 
 
 def test_without_a_road_all_is_matched_as_a_whole(street, whole):
-    found = match_pair(street.left, street.right, StereoOptions(), lambda small: None)
+    found = match_pair(street.left, street.right, StereoOptions(), lambda *_: None)
     np.testing.assert_array_equal(found.disparity, whole.disparity)
     assert found.lacks_road
 
@@ -182,7 +182,7 @@ def test_a_wide_view_is_matched_over_a_wider_range():
     plane = (20 / 3, 0.0, 0.3)
     options = StereoOptions(align="off")
 
-    found = match_pair(texture[:, :width], right, options, lambda small: plane).disparity
+    found = match_pair(texture[:, :width], right, options, lambda *_: plane).disparity
 
     bent = truth - 20 - 0.3 * v > 7
     off = np.abs(found - truth[:, None])[bent]

@@ -290,7 +290,7 @@ def test_only_usable_pixels_tell_the_plane():
     both = np.where(half, low, high)
     left = np.broadcast_to(half, both.shape)
     for usable, horizon in ((left, 60), (~left, 30)):
-        at_origin, _, down = road_plane(both, usable)
+        at_origin, _, down = road_plane(both, usable=usable)
         assert -at_origin / down == pytest.approx(horizon, abs=0.3)
 
 
