@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,6 +28,9 @@ _RANGE_ROUNDS = 4
 # How far beyond the largest disparity is searched, times it; and the share of this that it has to lie within
 _BEYOND, _WITHIN = 1.4, 0.85
 _MIN_SHARE = 0.01  # of the pixels, to say anything
+# Of them, that are found with a wider range, too: 0.36 and more of real pairs, 0.24 of rendered ones with a
+# bare sky; 0.10 to 0.17 where another range is right
+_HARDLY_BELIEVED = 0.2
 
 
 @dataclass(frozen=True)
@@ -39,12 +43,15 @@ class SmallMatch:
         The largest disparity, outliers aside.
     disparity : ndarray of float32
         The map.
+    believed : float
+        Share of the pixels that are found over a wider range, too.
     measured : Measured or None
         How the right view lies; None where it was not measured, or cannot be told.
     """
 
     top: float
     disparity: NDArray[np.float32]
+    believed: float
     measured: Measured | None = None
 
 
@@ -175,14 +182,15 @@ def _match_again(views: Views, top: float) -> SmallMatch | None:
     searched = _BEYOND * top + 4
     disparity = _match(views, searched)
     found = _top(disparity, 99)
-    return None if found is None or found > _WITHIN * searched else SmallMatch(found, disparity)
+    return None if found is None or found > _WITHIN * searched else SmallMatch(found, disparity, 1.0)
 
 
 def _match_small(views: Views) -> SmallMatch | None:
     """Match over the range that is found to be enough; None where nothing can be matched.
 
     A search over half the width finds any disparity that a pair can have, but leaves out the left half of
-    the image. What it finds starts a narrower one.
+    the image. What it finds starts a narrower one. Where glare or darkness is in the right half, it finds
+    anything: a search that begins with the smallest disparities grows with the road that comes nearer.
     """
     half = shrink_both(views, 2)
     rough, found = _rough(half), None
@@ -190,6 +198,9 @@ def _match_small(views: Views) -> SmallMatch | None:
         found = _match_up_to(views, 2 * rough)
     if found is None:  # a near scene, or grain that is gone at half the size
         found = _match_up_to(views, _rough(views))
+    if found is None or found.believed < _HARDLY_BELIEVED:
+        grown = _match_up_to(views, NARROWEST / 2)
+        found = max(filter(None, (found, grown)), key=lambda each: each.believed, default=None)
     return found
 
 
@@ -214,7 +225,8 @@ def _match_up_to(views: Views, top: float | None) -> SmallMatch | None:
         )
         believed = np.where(np.abs(narrow - wide) < 1, narrow, np.float32(0))
         top = _top(believed, 99)
-        found = None if top is None else SmallMatch(top, np.where(wide > 0, believed, narrow))
+        share = cv2.countNonZero(believed) / believed.size
+        found = None if top is None else SmallMatch(top, np.where(wide > 0, believed, narrow), share)
         if top is not None and top < _WITHIN * searched:
             break
     return found

@@ -273,6 +273,13 @@ def test_the_range_holds_what_is_there_and_a_tenth_more(disparity):
     assert 1.1 * disparity + 5 <= look_for_range(pair_of(disparity)).range <= 1.1 * disparity + 12
 
 
+@pytest.mark.parametrize("disparity", [8, 30])
+def test_the_range_grows_with_what_is_there_where_glare_hides_the_half_that_a_wide_search_sees(disparity):
+    left, right = pair_of(disparity)
+    left[:, 320:] = 255
+    assert 1.1 * disparity + 5 <= look_for_range((left, right)).range <= 1.1 * disparity + 12
+
+
 def test_where_nothing_is_matched_no_range_is_found():
     flat = np.full((240, 640), 90, np.uint8)
     assert look_for_range((flat, flat)) == FirstLook(None, None)
