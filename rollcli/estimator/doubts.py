@@ -142,4 +142,4 @@ def _doubts_of_plane(
     ahead = (near < begins) & (near > begins / 2)
     seen = valid & ahead
     if seen.sum() > _ENOUGH * ahead.sum() and on_road[seen].mean() < tuning.least_beyond:
-        yield "the plane is closed off near ahead, as the floor of a room is"
+        yield "the plane is closed off near ahead, as the floor of a room or a road behind a near car is"
