@@ -1,6 +1,7 @@
 """The page as a browser shows it."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -247,7 +248,8 @@ def test_a_printed_page_shows_both_sides_of_the_switch_and_keeps_headings_with_w
 def test_a_hundred_and_twenty_frames_are_a_sheet_of_answer_and_six_of_pictures(opened, tmp_path):
     write_kitti(tmp_path / "map.png", road_map(0.02, width=480))
     rolls = np.random.default_rng(2).normal(1.1, 0.2, 120)
-    url = page_of(tmp_path, [row("map.png", roll) for roll in rolls.tolist()], frames_shown=120)
+    found = [replace(row("map.png", roll), width=480) for roll in rolls.tolist()]
+    url = page_of(tmp_path, found, frames_shown=120)
     page = opened(url=url, scheme="dark")
     assert len(re.findall(rb"/Type /Page\b", page.pdf(format="A4"))) <= 7
 
