@@ -10,11 +10,15 @@ import pytest
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.request import Request
 from rollcli.estimator.road.find import road_plane
+from rollcli.run.library import estimate_pair
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
 from rollcli.stereo import match as matching
+from rollcli.stereo.along_road import Levelled
 from rollcli.stereo.match import StereoOptions, compute_disparity, match_pair
+from rollcli.stereo.misalignment import LEVEL, Misalignment
+from rollcli.stereo.views import prepare_views
 from tests.odd_views import seen_by
 from tests.real_pairs import LIDAR, needs_lidar, real_pairs
 from tests.true_disparity import true_disparity
@@ -224,3 +228,26 @@ def test_a_street_of_which_one_view_was_exposed_half_as_long_has_much_the_same_r
 
     assert darker.status == same.status
     assert math.degrees(darker.theta) == pytest.approx(math.degrees(same.theta), abs=0.1)
+
+
+@pytest.mark.parametrize(("lower", "searches"), [(1.0, 1), (2.0, 2)])
+def test_a_pair_that_hardly_moves_is_matched_again_along_the_same_plane(street, lower, searches):
+    asked = []
+
+    def find(small, smaller):
+        asked.append(smaller)
+        return road_plane(small, smaller)
+
+    views = prepare_views(street.left, street.right)
+    first = Levelled(views, LEVEL, None, 0, 64, StereoOptions(), find)
+    again = replace(first, lies=Misalignment(lower), before=first)
+    assert None not in (first.plane, again.plane)
+    assert asked == [3] * searches
+
+
+@needs_lidar
+@pytest.mark.parametrize("place", [17, 22])  # a road in the shade of trees, and one that glares
+def test_no_seed_finds_another_plane(place):
+    (pair,) = real_pairs(slice(place, place + 1))
+    rolls = [estimate_pair(*pair, seed=seed).roll_deg for seed in range(4)]
+    assert np.ptp(rolls) < 0.1
