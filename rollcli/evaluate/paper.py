@@ -3,7 +3,6 @@
 import contextlib
 from collections.abc import Mapping, Sequence
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rollcli.errors import ExitStatus, UsageError
@@ -12,7 +11,7 @@ from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.extras import require_extra
 from rollcli.files.inputs import stem_of
 from rollcli.files.storage import write_output
-from rollcli.files.stores.locations import is_url
+from rollcli.files.stores.locations import within
 from rollcli.run.find import find_frames
 from rollcli.run.frame import Frame
 from rollcli.run.outputs import check_places, listed_only
@@ -56,7 +55,7 @@ def run_paper(options: PaperOptions) -> ExitStatus:
     truth = _known_angles(frames, options)
     kind = options.experiments.figure
     names = [f"{name}.{kind}" for name in FIGURES] if kind is not None else []
-    writes = [_place(folder, name) for name in (*(f"{name}.csv" for name in TABLES), *names, PAGE)]
+    writes = [within(folder, name) for name in (*(f"{name}.csv" for name in TABLES), *names, PAGE)]
     reads = [path for frame in frames for path in frame.reads()]
     if listed_only(reads, writes, options.running):
         return ExitStatus.DONE
@@ -100,7 +99,7 @@ def _run(frames: Sequence[Frame], truth: Mapping[str, KnownPose], options: Paper
         return progress.summary.status
     times = _time(frames, found, options, progress)
     _write(found, failed, times, options)
-    progress.note(f"{_place(options.experiments.output, PAGE)} and {len(TABLES)} tables are written")
+    progress.note(f"{within(options.experiments.output, PAGE)} and {len(TABLES)} tables are written")
     return progress.summary.status
 
 
@@ -133,8 +132,4 @@ def _write(
         for name, figure in figures.items():
             written[f"{name}.{kind}"] = chart_file(figure, kind, PRINT)
     for name, data in written.items():
-        write_output(_place(options.experiments.output, name), data, overwrite=options.running.overwrite)
-
-
-def _place(folder: str, name: str) -> str:
-    return f"{folder.rstrip('/')}/{name}" if is_url(folder) else str(Path(folder, name))
+        write_output(within(options.experiments.output, name), data, overwrite=options.running.overwrite)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from rollcli.files.stores.locations import within
 from rollcli.run.options import RunningOptions
 
 
@@ -48,4 +49,4 @@ class ReportOptions:
     def chart_paths(self, name: str) -> dict[str, str]:
         """Return where a chart is written, by format."""
         folders = {"svg": self.svg, "pdf": self.pdf, "png": self.png}
-        return {kind: f"{folder.rstrip('/')}/{name}.{kind}" for kind, folder in folders.items() if folder}
+        return {kind: within(folder, f"{name}.{kind}") for kind, folder in folders.items() if folder}

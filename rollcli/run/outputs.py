@@ -18,7 +18,7 @@ from rollcli.files.containers import file_of, shown
 from rollcli.files.naming import gathered
 from rollcli.files.results import STATUSES
 from rollcli.files.storage import create, read_bytes, remove, remove_all, write_bytes
-from rollcli.files.stores.locations import is_object_url, is_url, located, public_name
+from rollcli.files.stores.locations import is_object_url, is_url, located, public_name, within
 from rollcli.files.stores.objects import list_objects
 from rollcli.run.frame import Frame
 from rollcli.run.options import ENDING_OF_FORMAT, RunningOptions, Written
@@ -46,7 +46,7 @@ def local_files(
 def output_path(frame: Frame, folder: str, ending: str | None = None) -> str:
     """Name the file of a frame below `folder`; it keeps the frame's own ending unless one is given."""
     name = frame.relative if ending is None else posixpath.splitext(frame.relative)[0] + ending
-    return f"{folder}{name}" if folder.endswith("/") else f"{folder}/{name}"
+    return within(folder, name)
 
 
 def every_path(frame: Frame, writes: Iterable[Written], root: str = "") -> list[str]:

@@ -24,7 +24,7 @@ from rollcli.files.encodings import KITTI_TOP, to_kitti
 from rollcli.files.formats import encode_stored
 from rollcli.files.locking import differences, not_resumable
 from rollcli.files.results import csv_table, read_run, run_path
-from rollcli.files.stores.locations import is_url
+from rollcli.files.stores.locations import require_local
 from rollcli.messages import say
 from rollcli.run.options import RunningOptions
 from rollcli.run.progress import TaskProgress
@@ -276,8 +276,7 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
         raise UsageError("--crossfall: a flat road has none; choose another --cross-section")
     if options.kerb is not None and options.scene not in (*KERBED, MIXED):
         raise UsageError(f"--kerb: the scene {options.scene} has no kerbs; {' and '.join(KERBED)} have")
-    if is_url(str(folder)):
-        raise UsageError(f"{folder}: pairs are rendered to local disk: name a folder here, and upload it")
+    require_local(str(folder), "pairs are rendered to local disk: name a folder here, and upload it")
     specs = draw_specs(options)
     dataset = Dataset(Path(folder), tuple(specs), _record(options))
     if _is_free(Path(folder)) or overwrite:

@@ -86,6 +86,7 @@ def read_correction(path: str) -> Correction:
     """
     try:
         with as_usage(), reading(f"--align {path}"):
+            # not by `read_named`, for which "-" is standard input: workers have none
             data = read_bytes(path, most=MOST_SETTINGS) if is_url(path) else read_given(path, MOST_SETTINGS)
         found = json.loads(data)
         values, bend = [float(found[name]) for name in _VALUES], float(found.get(_BEND, 0.0))

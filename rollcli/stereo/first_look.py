@@ -4,7 +4,6 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -225,7 +224,7 @@ def _match_up_to(views: Views, top: float | None) -> SmallMatch | None:
         )
         believed = np.where(np.abs(narrow - wide) < 1, narrow, np.float32(0))
         top = _top(believed, 99)
-        share = cv2.countNonZero(believed) / believed.size
+        share = np.count_nonzero(believed) / believed.size
         found = None if top is None else SmallMatch(top, np.where(wide > 0, believed, narrow), share)
         if top is not None and top < _WITHIN * searched:
             break

@@ -84,15 +84,15 @@ def is_remote(location: str) -> bool:
     return share or is_url(location)
 
 
-def require_local(location: str) -> None:
-    """Refuse a recording in a store, which can only be read from its start to its end.
+def require_local(location: str, why: str = "recordings are read from local disk: download it first") -> None:
+    """Refuse a place in a store where one on a disk is needed, such as that of a recording.
 
     Raises
     ------
     UsageError
     """
     if is_url(location):
-        raise UsageError(f"{public_name(location)}: recordings are read from local disk: download it first")
+        raise UsageError(f"{public_name(location)}: {why}")
 
 
 def public_name(location: str) -> str:
@@ -121,6 +121,11 @@ def names_a_file(relative: str) -> bool:
 def located(root: str, location: str) -> str:
     """Return where a location lies for a worker whose relative paths start at `root`."""
     return location if not root or is_url(location) else str(Path(root, location))
+
+
+def within(folder: str, name: str) -> str:
+    """Return where a name lies in a folder, which is a path or a URL."""
+    return f"{folder}{name}" if folder.endswith("/") else f"{folder}/{name}"
 
 
 def base_name(location: str) -> str:
