@@ -1,7 +1,14 @@
 """What a right camera sees: a texture further left, and all of a view that is turned, lower or larger."""
 
+import dataclasses
+import math
+
 import cv2
 import numpy as np
+
+from rollcli.simulate.build import build_scene
+from rollcli.simulate.spec import Stream
+from rollcli.simulate.views import expose, render_view
 
 
 def pair_at(disparity, shape=(120, 400), seed=0, first=None):
@@ -35,3 +42,16 @@ def seen_turned(view, yaw_deg=0.0, pitch_deg=0.0, focal=0.7):
     seen = camera @ turned @ np.linalg.inv(camera)
     how = {"flags": cv2.INTER_LANCZOS4, "borderMode": cv2.BORDER_REFLECT}
     return cv2.warpPerspective(view, seen, (width, height), **how)
+
+
+def seen_rolled(spec, clockwise_deg):
+    """What the right camera of a frame sees that is rolled: its image is turned about its principal point."""
+    scene = build_scene(spec)
+    camera = spec.cameras(scene.normal)[1]
+    right, down, ahead = camera.axes
+    cosine, sine = math.cos(math.radians(clockwise_deg)), math.sin(math.radians(clockwise_deg))
+    axes = np.array([cosine * right - sine * down, sine * right + cosine * down, ahead])
+    light = render_view(scene, dataclasses.replace(camera, axes=axes)).light
+    # noise of its own, not that of the left view
+    rng = np.random.default_rng([spec.seed, spec.index, Stream.SENSOR])
+    return expose(light, spec.noise, spec.gain, spec.colour, rng)

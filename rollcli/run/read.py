@@ -158,16 +158,27 @@ class Source:
         return json.dumps({"slope_error": self.slope_error, "doubt": doubt, "alignment": self.alignment})
 
     def calibrated(self, calibration: Calibration | None) -> Calibration | None:
-        """Scale a calibration of the images in the files to the map; none stays none.
+        """Return the calibration of the map, from that of the images in the files; none stays none.
+
+        Its `doffs` has what levelling has put into all disparities: a right camera that is rolled turns its
+        view about the principal point, and levelling turns it back about the middle of the image.
 
         Raises
         ------
         UsageError
             It is of another view: see `Calibration.for_size`.
         """
-        if calibration is not None and self.size is not None:
+        if calibration is None:
+            return None
+        if self.size is not None:
             calibration = calibration.for_size(*self.size)
-        return calibration and calibration.for_size(*self.disparity.shape[::-1])
+        height, width = self.disparity.shape
+        calibration = calibration.for_size(width, height)
+        clockwise = math.radians(self.alignment.get("right_clockwise_deg", 0.0))
+        if not (clockwise and self.slope_error):  # nothing was levelled
+            return calibration
+        below = calibration.cy - (height - 1) / 2
+        return replace(calibration, doffs=calibration.doffs + clockwise * below)
 
     @property
     def shown(self) -> NDArray[Any]:

@@ -7,10 +7,12 @@ import pytest
 
 import rollcli as package
 from rollcli.files.results import ALIGNMENT_COLUMNS
+from rollcli.rig.calibration import Calibration
 from rollcli.run.read import Source, _carried
 from rollcli.simulate.build import render_frame
-from rollcli.simulate.spec import FrameSpec
-from tests.odd_views import seen_by
+from rollcli.simulate.options import SimulateOptions
+from rollcli.simulate.spec import FrameSpec, draw_specs
+from tests.odd_views import seen_by, seen_rolled
 from tests.run_cli import rollcli, rows_of, write_views
 
 VIEWS = ("--left", "left", "--right", "right")
@@ -65,6 +67,46 @@ def test_a_map_that_is_turned_upright_keeps_what_levelling_left_open(pair):
         assert float(row["roll_deg"]) == pytest.approx(0, abs=0.02)
         assert float(row["roll_ci95_deg"]) == pytest.approx(float(of_pair["roll_ci95_deg"]), abs=0.01)
         assert [row[name] for name in ALIGNMENT_COLUMNS] == [of_pair[name] for name in ALIGNMENT_COLUMNS]
+
+
+def test_where_the_right_camera_is_rolled_the_interval_holds_the_pitch():
+    """The principal point lies 30 px off the middle row: levelling moves all disparities by 0.16 px."""
+    rig = {"pitch_deg": (2.0, 7.0), "curvature": (0.0, 0.0), "grey": True, "frames": 6, "seed": 52}
+    held, off = [], []
+    for row, clockwise_deg in ((209.5, 0.3), (269.5, -0.3)):
+        for spec in draw_specs(SimulateOptions(principal_point=(319.5, row), **rig)):
+            calibration = Calibration(spec.focal, spec.focal, *spec.centre, spec.baseline)
+            right = seen_rolled(spec, clockwise_deg)
+            found = package.estimate_pair(render_frame(spec).left, right, calibration=calibration)
+            off.append(math.degrees(abs(found.pitch - spec.pitch)))
+            held.append(math.radians(off[-1]) <= found.pitch_ci95)
+    assert np.mean(held) >= 0.95 - 3 * math.sqrt(0.95 * 0.05 / len(held))
+    assert np.median(off) < 0.015
+
+
+def test_a_map_of_a_pair_whose_right_camera_is_rolled_has_the_pitch_of_its_pair(tmp_path):
+    spec = FrameSpec(scene="open", pitch=0.07, principal_point=(319.5, 200.0), seed=12, colour=False)
+    write_views(tmp_path, "a.png", render_frame(spec).left, seen_rolled(spec, 0.5))
+    x, y = spec.centre
+    views = ((0, 0), (1, -spec.focal * spec.baseline))
+    (tmp_path / "calib.txt").write_text(
+        "".join(CAMERA.format(*view, f=spec.focal, x=x, y=y) for view in views)
+    )
+    of_pair = row_of(tmp_path, *VIEWS)
+    assert rollcli("disparity", *VIEWS, "-o", "maps", cwd=tmp_path).status == 0
+    of_map = row_of(tmp_path, "maps")
+
+    assert float(of_pair["pitch_deg"]) == pytest.approx(math.degrees(spec.pitch), abs=0.03)
+    assert float(of_map["pitch_deg"]) == pytest.approx(float(of_pair["pitch_deg"]), abs=0.005)
+
+
+def test_a_pair_that_was_measured_and_not_levelled_has_the_calibration_as_it_is():
+    calibration = Calibration(300.0, 300.0, 160.0, 60.0, 0.5, 1.5)
+    known = {"disparity": np.ones((240, 320)), "alignment": {"right_clockwise_deg": 0.01}}
+    assert Source(**known).calibrated(calibration).doffs == 1.5
+    levelled = 1.5 + math.radians(0.01) * (60 - 119.5)
+    assert Source(**known, slope_error=1e-4).calibrated(calibration).doffs == pytest.approx(levelled)
+    assert Source(**known).calibrated(None) is None
 
 
 def test_the_call_says_what_the_command_does(pair):
