@@ -245,9 +245,11 @@ def moves(found: Findings) -> Iterator[str]:
             yield f"{quantity.name} against the other result: {said}, {told[moved(change)]}"
 
 
+# OpenCV's cubic moves what lies between pixels: pitches of 60 rendered pairs that were turned by 0.3 degrees
+# and levelled by it are off by 0.018 degrees on average, with Lanczos' weights by 0.008, as of level pairs
 _CALL = (
     "cv2.warpPerspective(right, np.array(matrix), (width, height), "
-    "flags=cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP, borderMode=cv2.BORDER_REPLICATE)"
+    "flags=cv2.INTER_LANCZOS4 | cv2.WARP_INVERSE_MAP, borderMode=cv2.BORDER_REPLICATE)"
 )
 
 
