@@ -3,7 +3,7 @@
     python tests/benchmarks/bench_rig.py [series] [first seed]
 
 Series: AR(1) of the car and the road, each frame's own error drawn evenly from 0.02 to 0.3 degrees. The
-numbers of rollcli/rig/drive/tuning.py were chosen on seeds below 1,000; the default begins at 100,000.
+numbers of `SequenceTuning` were chosen on seeds below 1,000; the default begins at 100,000.
 """
 
 import json
@@ -53,6 +53,9 @@ SETTINGS = [
     ("drift 1", 2000, 0.94, 0.3),
     ("drift 1", 4000, 0.94, 0.3),
     ("5 % gross", 2000, 0.94, 0.3),
+    ("bumps", 400, 0.97, 0.2),
+    ("sways", 400, 0.97, 0.2),
+    ("sways", 1600, 0.97, 0.2),
 ]
 
 
@@ -72,6 +75,8 @@ def assess_many(what: str, frames: int, phi: float, sd: float, series: int, firs
             at=at,
             drift=1.0 * (what == "drift 1"),
             gross=0.05 * (what == "5 % gross"),
+            bumps=0.3 * (what == "bumps"),
+            sways=0.2 * (what == "sways"),
         )
         found.append((assess_sequence(values, errors), at))
     sure = [rig for rig, _ in found if rig.now.ci95 is not None]

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rollcli.rig.drive.posterior import TUNING, Fit, Flags, Likelihood, Series, make_cells
+from rollcli.rig.drive.posterior import TUNING, Fit, Flags, Likelihood, Series, correlations_at, make_cells
 
 _SIDE = 2.5  # cells on each side of a jump that are looked at again
 _FEWEST = 60  # frames on each side: what is beside a jump tells its levels
@@ -112,7 +112,7 @@ class _Search:
         after = (self.cells.centres - start) / self.cells.width
         fit = self._fit(others, found.drift)
         at = int(np.unravel_index(int(fit.log_evidence.argmax()), fit.log_evidence.shape)[0])
-        fading = np.where(after >= 0, TUNING.correlations[at] ** np.maximum(after, 0), 0.0)
+        fading = np.where(after >= 0, correlations_at(np.maximum(after, 0))[at], 0.0)
         kicked = self._likelihood.fit(np.column_stack([self.cells.design(others, found.drift), fading]))
         return found.score >= kicked.evidence - TUNING.jump_penalty * len(found.starts) - (
             TUNING.drift_penalty * found.drift

@@ -12,6 +12,16 @@ def ar1(rng, frames, phi, sd):
     return values
 
 
+def swaying(rng, frames, period, left, sd):
+    """Stationary AR(2): a body that swings on its springs; `left` of a swing is there a frame later."""
+    first, second = 2 * left * np.cos(2 * np.pi / period), -(left**2)
+    kick = sd * np.sqrt((1 - second) ** 2 - first**2) * np.sqrt((1 + second) / (1 - second))
+    values = [0.0, 0.0]
+    for each in rng.normal(0, kick, frames + 200):
+        values.append(first * values[-1] + second * values[-2] + each)
+    return np.array(values[-frames:])
+
+
 def drive(
     seed,
     frames=2000,
@@ -24,11 +34,19 @@ def drive(
     at=None,
     drift=0.0,
     gross=0.0,
+    bumps=0.0,
+    sways=0.0,
 ):
-    """Values and their standard errors; `gross` is the share of outliers, all to one side."""
+    """Values and their standard errors; `gross` is the share of outliers, all to one side.
+
+    `bumps` and `sways` are standard deviations of what comes on top of the AR(1): another movement each frame,
+    and a body that swings on its springs with a period of 8 frames.
+    """
     rng = np.random.default_rng(seed)
     own = rng.uniform(*errors, frames)
     values = level + ar1(rng, frames, phi, sd) + rng.normal(0, 1, frames) * own
+    values += rng.normal(0, bumps, frames) if bumps else 0.0
+    values += swaying(rng, frames, 8, 0.85, sways) if sways else 0.0
     values[frames // 2 if at is None else at :] += jump
     values += drift * (np.arange(frames) / (frames - 1) - 0.5)
     bad = rng.random(frames) < gross

@@ -28,11 +28,18 @@ def covariance_of(cells, place, noise):
     spreads = np.geomspace(*TUNING.spreads, TUNING.spread_steps)
     spread, (factor, _) = spreads[noise // FACTORS], TUNING.error_factors[noise % FACTORS]
     distance = np.abs(cells.centres[:, None] - cells.centres)
-    return spread**2 * TUNING.correlations[place] ** distance + factor * np.diag(cells.variances)
+    if place < len(TUNING.correlations):
+        correlation = TUNING.correlations[place] ** distance
+    else:
+        slow, fast = divmod(place - len(TUNING.correlations), len(TUNING.fast))
+        left, period = TUNING.fast[fast]
+        swings = left**distance * np.cos(2 * np.pi * distance / period)
+        correlation = (TUNING.slow[slow] ** distance + swings) / 2
+    return spread**2 * correlation + factor * np.diag(cells.variances)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("place", "noise"), [(0, 2), (4, 30), (12, 69), (8, 41)])
+@pytest.mark.parametrize(("place", "noise"), [(0, 2), (4, 30), (12, 69), (16, 50), (21, 41)])
 def test_each_noise_has_the_fit_of_statsmodels_and_the_likelihood_of_scipy(cells, place, noise):
     import statsmodels.api as sm
     from scipy.stats import multivariate_normal
@@ -46,7 +53,8 @@ def test_each_noise_has_the_fit_of_statsmodels_and_the_likelihood_of_scipy(cells
     left = multivariate_normal(oracle.fittedvalues, covariance).logpdf(cells.values)
     level = np.linalg.slogdet(np.linalg.inv(oracle.normalized_cov_params))[1]
     spread = np.geomspace(*TUNING.spreads, TUNING.spread_steps)[noise // FACTORS]
-    others = (1 - TUNING.independent) / (len(TUNING.correlations) - 1)
+    several = len(TUNING.correlations) + len(TUNING.slow) * len(TUNING.fast)
+    others = (1 - TUNING.independent) / (several - 1)
     prior = np.log(TUNING.error_factors[noise % FACTORS][1]) + TUNING.spread_power * np.log(spread)
     prior += np.log(others if place else TUNING.independent)
     expected = left - level / 2 + prior
@@ -124,6 +132,17 @@ def test_errors_that_are_said_too_small_do_not_make_the_interval_too_narrow():
         now = assess_sequence(values, np.full(120, 0.05)).now
         inside += abs(now.value) <= now.ci95
     assert inside >= 26
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fast", [{"bumps": 0.3}, {"sways": 0.2}], ids=str)
+def test_a_slow_movement_under_a_faster_one_is_covered_and_seldom_a_jump(fast):
+    found = [
+        assess_sequence(*drive(seed, 400, level=0.0, phi=0.97, errors=(0.02, 0.1), **fast))
+        for seed in range(30)
+    ]
+    assert sum(abs(rig.now.value) <= rig.now.ci95 for rig in found) >= 26
+    assert sum(bool(rig.jumps) for rig in found) <= 5
 
 
 @pytest.mark.parametrize("frames", mostly_slow([1, 2, 9, 200, 2000, 20_000], 1, 9, 200))
