@@ -53,4 +53,7 @@ BOUNDS = {
     "pitch_deg": (-90.0, 90.0),
     "height_m": (0.0, math.inf),
 }
-COLUMNS = tuple(name for each in (*QUANTITIES, *ALIGNMENT) for name in (each.column, each.ci_column) if name)
+COLUMNS = (
+    *(name for each in (*QUANTITIES, *ALIGNMENT) for name in (each.column, each.ci_column) if name),
+    *SIZE,  # frames of several sizes are several drives
+)

@@ -17,8 +17,7 @@ from rollcli.files.stores.locations import base_name, is_remote
 from rollcli.messages import say
 from rollcli.rig.drive.assess import RigAssessment, RigFrames, assess_frames, difference, short_names
 from rollcli.rig.drive.posterior import Estimate
-from rollcli.rig.quantities import ALIGNMENT, QUANTITIES, ROLL, SIZE
-from rollcli.rig.quantities import COLUMNS as QUANTITY_COLUMNS
+from rollcli.rig.quantities import ALIGNMENT, COLUMNS, QUANTITIES, ROLL
 from rollcli.rig.words import findings
 from rollcli.run.find import calibration_finder
 from rollcli.run.frame import Frame
@@ -33,8 +32,6 @@ from rollcli.stereo.alignment import Measured
 from rollcli.stereo.correction import DriveRows
 from rollcli.stereo.match import match_pair
 from rollcli.stereo.row_fit import ColumnEvidence, column_support
-
-COLUMNS = (*QUANTITY_COLUMNS, *SIZE)
 
 
 def _assessed(paths: Sequence[str], options: RigOptions) -> tuple[RigAssessment, str, list[str]]:

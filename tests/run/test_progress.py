@@ -27,6 +27,18 @@ def test_of_many_causes_the_first_five_are_said(capsys):
     ]
 
 
+def test_frames_of_two_sizes_are_two_drives():
+    summary = RunSummary()
+    for place in range(40):
+        roll, size = ((1.0, (320, 240)), (4.0, (640, 480)))[place % 2]
+        moved = roll + 0.1 * (place % 8 - 3.5)
+        row = Row(f"m/{place}.png", "", "ok", moved, 0.1, width=size[0], height=size[1])
+        summary.add_row(row, place)
+    told = summary.rig_roll()
+    assert "in m (640x480); the drives differ: " in told
+    assert "in m (320x240)" in told
+
+
 @pytest.fixture
 def clock(monkeypatch):
     """A monotonic clock that a test moves."""

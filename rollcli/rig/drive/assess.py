@@ -399,7 +399,7 @@ def _frames(rows: Any) -> RigFrames:
     files = [f"frame {place}" for place in range(len(states))]
     if "file" in rows:
         files = list(map(str, rows["file"]))
-    numbers = {name: _floats(rows[name]) for name in (*COLUMNS, *SIZE) if name in rows}
+    numbers = {name: _floats(rows[name]) for name in COLUMNS if name in rows}
     for name, (low, high) in BOUNDS.items():
         values = numbers.get(name, np.empty(0))
         outside = values[(values < low) | (values > high)]
@@ -415,7 +415,7 @@ def _frames(rows: Any) -> RigFrames:
 
 def _columns(rows: Sequence[Any]) -> dict[str, list[Any]]:
     """Return the columns of rows that are mappings or have attributes."""
-    names = ("status", "file", *COLUMNS, *SIZE)
+    names = ("status", "file", *COLUMNS)
     if rows and not isinstance(rows[0], Mapping):
         return {name: [getattr(row, name) for row in rows] for name in names if hasattr(rows[0], name)}
     there = [name for name in names if not rows or any(name in row for row in rows)]
