@@ -130,7 +130,7 @@ def horizon_row(tangent: Tangent, calibration: Calibration) -> float | None:
     return tangent.row - (tangent.disparity + calibration.doffs) / tangent.slope
 
 
-def taken_as_exact(calibration: Calibration, pitch: float, height: float | None) -> str:
+def taken_as_exact(calibration: Calibration, pitch: float, height: float | None, scale: float = 1.0) -> str:
     """Say in one line what the intervals cannot know: errors of the calibration, and what they would do.
 
     Parameters
@@ -140,11 +140,13 @@ def taken_as_exact(calibration: Calibration, pitch: float, height: float | None)
         Radians.
     height : float or None
         Metres; None without a baseline.
+    scale : float
+        Width of the maps, as a share of that of the images of the calibration.
     """
     turn = math.degrees(math.cos(pitch) ** 2)
     said = f"the calibration as exact: {turn / calibration.fy:.3f} degrees of pitch per px of cy"
     if calibration.baseline is not None and height is not None:
-        down = calibration.fx * calibration.baseline * math.cos(pitch) / height  # fx times the slope, px
+        down = scale * calibration.fx * calibration.baseline * math.cos(pitch) / height  # fx times the slope
         said += f", {0.1 * turn / down:.3f} per 0.1 px of disparity (vergence)"
         said += ", 1 % of height per 1 % of baseline"
         least, most = LIKELY_BASELINE

@@ -70,7 +70,8 @@ def _run(plan: Plan, resume_command: str) -> ExitStatus:
             return ExitStatus.INTERRUPTED
         if not (progress.stopped_early or options.running.quiet):
             calibrated = (frame.calibration for frame in plan.frames if frame.calibration is not None)
-            if note := progress.summary.pose_note(next(calibrated, None)):
+            downscale = options.stereo.downscale if options.paired else 1.0
+            if note := progress.summary.pose_note(next(calibrated, None), downscale):
                 progress.say(note)
             progress.say(progress.summary.rig_roll())
         return progress.summary.status

@@ -140,14 +140,18 @@ class RunSummary:
         numbers = {name: np.asarray(column)[order] for name, column in self._numbers.items()}
         return one_line(assess_rig({"file": files, "status": statuses, **numbers}))
 
-    def pose_note(self, calibration: Calibration | None) -> str:
-        """Return what the intervals of pitch and height leave out; empty where no frame has a pitch."""
-        pitch, height = self._median("pitch_deg"), self._median("height_m")
-        if calibration is None or pitch is None:
+    def pose_note(self, calibration: Calibration | None, downscale: float) -> str:
+        """Return what the intervals of pitch and height leave out; empty where no frame has a pitch.
+
+        Pairs were matched at 1/downscale of their size.
+        """
+        pitch, height, width = map(self._median, ("pitch_deg", "height_m", "width"))
+        if calibration is None or pitch is None or width is None:
             return ""
         from rollcli.rig.pose import taken_as_exact
 
-        return taken_as_exact(calibration, math.radians(pitch), height)
+        scale = 1 / downscale if calibration.width is None else width / calibration.width
+        return taken_as_exact(calibration, math.radians(pitch), height, scale)
 
     def _median(self, name: str) -> float | None:
         known = self._known(name)
