@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rollcli.errors import ExitStatus, InputError, UsageError
+from rollcli.errors import ExitStatus, UsageError
 from rollcli.extras import require_extra
 from rollcli.files.naming import listed, natural_key
 from rollcli.files.results import Result, Row, read_result, run_path
@@ -20,7 +20,7 @@ from rollcli.run.options import EncodingOptions
 from rollcli.run.outputs import check_named_once, listed_only
 from rollcli.run.progress import Progress
 from rollcli.run.resume import recorded_calibrations, recorded_options
-from rollcli.run.rig import order_of
+from rollcli.run.rig import order_of, require_rows
 from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import stop_on_signals
 from rollcli.run.workers.tasks import run_tasks
@@ -55,9 +55,7 @@ def run_report(options: ReportOptions) -> ExitStatus:
     require_extra("report", "the page")
     check_named_once(options.results)
     parts = [read_result(path) for path in options.results]
-    for path, part in zip(options.results, parts, strict=True):
-        if not part.rows:
-            raise InputError(f"{path}: has no rows: there is nothing to report")
+    require_rows(parts, "report")
     # all rows in the order of the run, or one result after the other; a shard alone may be shown
     owned = [(number, row) for number, part in enumerate(parts) for row in part.rows]
     origins = list[str]()

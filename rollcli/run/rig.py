@@ -50,9 +50,7 @@ def _assessed(paths: Sequence[str], options: RigOptions) -> tuple[RigAssessment,
         Shards are not of one run, one is missing, or the rows are of several methods.
     """
     parts = [results.read_columns(path, COLUMNS) for path in paths]
-    for part in parts:
-        if not part.files:
-            raise InputError(f"{part.path}: has no rows: there is nothing to assess")
+    require_rows(parts, "assess")
     methods = sorted(set().union(*(part.methods for part in parts)))
     if len(methods) > 1:
         names = listed(part.path for part in parts)
@@ -77,6 +75,19 @@ def _joined(parts: Sequence[ResultColumns], name: str) -> NDArray[np.float64]:
 
 
 Part = results.Result | ResultColumns  # one of several that are put together
+
+
+def require_rows(parts: Sequence[Part], purpose: str) -> None:
+    """Refuse results without rows; of several shards some may have none, as of few frames.
+
+    Raises
+    ------
+    InputError
+    """
+    some = any(part.files for part in parts)
+    for part in parts:
+        if not (part.files or (some and _shard(part) not in (None, (1, 1)))):
+            raise InputError(f"{part.path}: has no rows: there is nothing to {purpose}")
 
 
 def order_of(parts: Sequence[Part]) -> tuple[NDArray[np.intp], list[str]]:
