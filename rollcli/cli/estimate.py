@@ -79,7 +79,14 @@ result_options = record(
         ),
     ),
     option("--format", Choice("csv", "jsonl", "parquet")),
-    option("--part-rows", Number("N", at_least=1, whole=True)),
+    option(
+        "--part-rows",
+        Number("N", at_least=1, whole=True),
+        Needs(
+            lambda ctx: ResultOptions(ctx.params["output"], ctx.params["format"]).in_parts,
+            "only Parquet and results in an object store have parts",
+        ),
+    ),
     option("--resume", FLAG),
     option("--update", FLAG),
     option("--retry-failed", FLAG),

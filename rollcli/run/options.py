@@ -406,6 +406,13 @@ class ResultOptions(NamedTuple):
         ending = posixpath.splitext(self.output.lower().rstrip("/"))[1]
         return self.format or _FORM_OF_ENDING.get(ending, "csv")
 
+    @property
+    def in_parts(self) -> bool:
+        """Whether the result is a folder of parts."""
+        from rollcli.files.stores.locations import is_url
+
+        return self.form == "parquet" or is_url(self.output)
+
 
 @dataclass(frozen=True, kw_only=True)
 class FramesOptions(ABC):

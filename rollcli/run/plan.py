@@ -7,7 +7,6 @@ from itertools import chain
 from rollcli.errors import UsageError
 from rollcli.files.results import IMAGE_ROLL, TIMING, Format, require_utf8, run_path
 from rollcli.files.storage import is_stream
-from rollcli.files.stores.locations import is_url
 from rollcli.rig.calibration import Calibration
 from rollcli.run import outputs
 from rollcli.run.find import calibration_files, check_depth, check_first_size, find_frames
@@ -38,7 +37,7 @@ class Plan:
     @property
     def in_parts(self) -> bool:
         """Whether the result is a folder of parts."""
-        return self.format == "parquet" or is_url(self.output)
+        return self.options.result.in_parts
 
     @property
     def files(self) -> list[str]:

@@ -12,7 +12,7 @@ from rollcli.errors import InputError, UsageError
 from rollcli.files import results
 from rollcli.files.naming import listed, natural_key
 from rollcli.files.results import STATUSES, ResultColumns, parse_rows, pieces_of, read_run, run_path
-from rollcli.files.storage import is_stream, write_output
+from rollcli.files.storage import STREAM, is_stream, write_output
 from rollcli.files.stores.locations import base_name, is_remote
 from rollcli.messages import say
 from rollcli.rig.drive.assess import RigAssessment, RigFrames, assess_frames, difference, short_names
@@ -231,6 +231,8 @@ def run_rig(options: RigOptions) -> int:
     writes = [each for each in outputs if not is_stream(each)]
     for names in (reads, writes):
         check_named_once(names)
+    if options.output == options.correction == STREAM:
+        raise UsageError("--correction and the answer cannot both go to stdout: name a file for one of them")
     check_options(options.gates)
     if listed_only(reads, writes, options.running):
         return 0
