@@ -42,7 +42,7 @@ class DriveRows(NamedTuple):
 
 
 class Correction(NamedTuple):
-    """How the right views of a rig lie, of one width.
+    """How the right views of a rig lie, of one size.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Correction(NamedTuple):
         None where the pairs of the drive could not be looked at together.
     offset_error : float
         Standard error of the offset, px; infinite where the drive does not tell it.
-    width : int
+    width, height : int
         Of the views, px.
     """
 
@@ -59,12 +59,24 @@ class Correction(NamedTuple):
     columns: ColumnSupport | None
     offset_error: float
     width: int
+    height: int
 
-    def resized(self, width: int) -> "Correction":
-        """Return the same of views so wide."""
+    def resized(self, width: int, height: int) -> "Correction":
+        """Return the same of views of another size, whose sides are rounded to whole pixels.
+
+        Raises
+        ------
+        UsageError
+            They are no scaled ones, as after a crop, which has another centre.
+        """
+        if abs(width * self.height - height * self.width) > max(width + height, self.width + self.height):
+            raise UsageError(
+                f"--align: the correction is for {self.width}x{self.height} px, the views have "
+                f"{width}x{height}: give the correction of their own drive; only scaled views are allowed for"
+            )
         factor = width / self.width
         columns = self.columns and self.columns.resized(factor)
-        return Correction(self.lies.resized(factor), columns, factor * self.offset_error, width)
+        return Correction(self.lies.resized(factor), columns, factor * self.offset_error, width, height)
 
     def of_pair(self, offset: float, error: float) -> Misalignment:
         """Return how one pair lies whose own offset, px, was measured with this standard error.
@@ -107,4 +119,4 @@ def read_correction(path: str) -> Correction:
     if not (fits and offset_error >= 0 and width > 0 and height > 0):
         raise UsageError(f"--align {path}: holds numbers that no rig has")
     lies = replace(Misalignment.of_values(values, height, width), curve=bend / (height / 2) ** 2)
-    return Correction(lies, columns, offset_error, width)
+    return Correction(lies, columns, offset_error, width, height)

@@ -249,10 +249,11 @@ def match_pair(
     """
     given = as_sharp(as_bright(prepare_views(left, right)))
     views = shrink(given[0], options.downscale), shrink(given[1], options.downscale)
-    width, first = views[0].shape[1], options.min_disparity
+    (height, width), first = views[0].shape[:2], options.min_disparity
     if usable_range(1, first, width, options.block_size) < NARROWEST:
         raise InputError(f"images {width} px wide are too narrow to match from disparity {first} on")
-    told, small, look = options.given_alignment(width), SmallViews(views, given), FirstLook(None, None)
+    told = options.given_alignment(width, height)
+    small, look = SmallViews(views, given), FirstLook(None, None)
     if options.measures_alignment:
         look = first_look(small)
     elif options.num_disparities is None:

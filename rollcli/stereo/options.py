@@ -75,11 +75,17 @@ class StereoOptions:
         if self.align not in ALIGN:
             read_correction(self.align)
 
-    def given_alignment(self, width: int) -> Correction:
-        """Return how the right view lies as the user says, of views so wide."""
+    def given_alignment(self, width: int, height: int) -> Correction:
+        """Return how the right view lies as the user says, of views of this size.
+
+        Raises
+        ------
+        UsageError
+            The user says it of views of another shape.
+        """
         if self.vertical_offset is not None or self.align in ALIGN:
-            return Correction(Misalignment(float(self.vertical_offset or 0)), None, 0.0, width)
-        return read_correction(self.align).resized(width)
+            return Correction(Misalignment(float(self.vertical_offset or 0)), None, 0.0, width, height)
+        return read_correction(self.align).resized(width, height)
 
     @property
     def is_default(self) -> bool:

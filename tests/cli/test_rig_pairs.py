@@ -136,3 +136,16 @@ def test_a_pair_that_contradicts_the_correction_is_suspect(pairs):
     assert len(rows) == 2
     assert {row["status"] for row in rows} == {"suspect"}
     assert all("do not lie as the correction says" in row["message"] for row in rows)
+
+
+def test_a_correction_is_for_views_of_its_shape_at_any_size(pairs):
+    for side in ("left", "right"):
+        view = cv2.imread(str(pairs / side / "frame_0001.png"))
+        cv2.imwrite(str(pairs / f"crop_{side}.png"), view[80:])
+    done = rollcli(
+        "estimate", "--left", "crop_left.png", "--right", "crop_right.png", "--align", "use.json", cwd=pairs
+    )
+    assert done.status == 3
+    assert "the correction is for 480x360 px, the views have 480x280" in rows_of(done.out)[0]["message"]
+    first = ("--left", "left/frame_0001.png", "--right", "off/frame_0001.png", "--downscale", "1.7")
+    assert rollcli("estimate", *first, "--align", "use.json", cwd=pairs).status == 0
