@@ -36,10 +36,15 @@ FLAG = click.BOOL  # of options that are given alone
 
 
 class Text(click.types.StringParamType):
-    """Any text."""
+    """Any text but an empty one, which would choose nothing."""
 
     def __init__(self, metavar: str) -> None:
         self.metavar = metavar
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if value == "":
+            self.fail("the text is empty: is a variable unset?", param, ctx)
+        return super().convert(value, param, ctx)
 
 
 class FilePath(click.Path):

@@ -75,10 +75,11 @@ PARAMS = [(ctx, param) for _, ctx in commands() for param in ctx.command.params]
 
 
 @pytest.mark.parametrize(("ctx", "param"), PARAMS, ids=lambda each: getattr(each, "name", None) or "of")
-def test_it_is_called_by_its_flag_says_what_it_does_and_takes_no_empty_path(ctx, param):
+def test_it_is_called_by_its_flag_says_what_it_does_and_takes_nothing_empty(ctx, param):
     if isinstance(param, click.Option):
         assert param.name == max(param.opts, key=len).removeprefix("--").replace("-", "_")
         assert param.help.endswith(".") or "[default:" in param.help
-    if isinstance(param.type, click.Path):  # which would be the current folder
-        with pytest.raises(click.BadParameter, match="the name is empty: is a variable unset"):
+    # an empty path would be the current folder
+    if isinstance(param.type, click.Path | click.types.StringParamType):
+        with pytest.raises(click.BadParameter, match="is empty: is a variable unset"):
             param.type_cast_value(ctx, ("",) if param.nargs == -1 or param.multiple else "")
