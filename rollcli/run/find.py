@@ -1,5 +1,6 @@
 """Find the frames that a user named, and the calibration of each."""
 
+import glob
 import itertools
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -10,9 +11,18 @@ from typing import TYPE_CHECKING, overload
 from rollcli.errors import InputError, UsageError
 from rollcli.extras import require_extra
 from rollcli.files.atomic import is_file
-from rollcli.files.containers import VIDEOS, bag_files, file_of, frame_name, is_archive, is_rest, is_video
+from rollcli.files.containers import (
+    BAGS,
+    VIDEOS,
+    bag_files,
+    file_of,
+    frame_name,
+    is_archive,
+    is_rest,
+    is_video,
+)
 from rollcli.files.inputs import Manifest, find_inputs, named_input, pair_inputs
-from rollcli.files.naming import Input, gathered
+from rollcli.files.naming import Input, gathered, natural_key
 from rollcli.files.search import IMAGE_ENDINGS, LEAVE_NONE, MAP_ENDINGS, Search, is_place, objects_behind
 from rollcli.files.storage import fetch_all, read_bytes
 from rollcli.files.stores.locations import is_url, names_a_file, public_name
@@ -377,10 +387,11 @@ def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
         Some are, or one is in a store, or --include and --exclude leave none, or the extra is missing.
     """
     bags = []
-    for name in dict.fromkeys(given.inputs):
+    named = dict.fromkeys(each for name in given.inputs for each in _behind(name))
+    for name in named:
         if files := bag_files(name):
             bags.append((name, files))
-    if bags and (len(bags) < len(set(given.inputs)) or given.files_from is not None):
+    if bags and (len(bags) < len(named) or given.files_from is not None):
         raise UsageError(f"{bags[0][0]}: is a bag: give bags and other inputs in runs of their own")
     if bags:
         require_extra("bags", bags[0][0])
@@ -389,6 +400,13 @@ def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
     if bags and not allowed:
         raise UsageError(f"no input found: {LEAVE_NONE} of the named bags")
     return allowed
+
+
+def _behind(name: str) -> list[str]:
+    """List the bags that a pattern finds, in natural order; of anything else the name itself."""
+    pattern = name.lower().endswith(BAGS) and not os.path.lexists(name)
+    found = glob.glob(name, recursive=True) if pattern else []  # noqa: PTH207 (as in a search)
+    return sorted(found, key=natural_key) or [name]
 
 
 def _bag_frames(bags: "Iterable[BagFrames]", make: "_FrameMaker", options: FramesOptions) -> list[Frame]:
