@@ -5,10 +5,12 @@ from typing import Any
 import click
 
 from rollcli.cli import options as shared
-from rollcli.cli.command import command, config_option, option
+from rollcli.cli.command import Needs, command, config_option, option
 from rollcli.cli.types import DIR, FLAG, PATH, Number, OutputFile, Text
 from rollcli.errors import ExitStatus
 from rollcli.report.options import ReportOptions
+
+_PAGE = Needs(lambda ctx: ctx.params["output"], "only a page has pictures: name one with -o")
 
 
 @command(
@@ -22,8 +24,8 @@ from rollcli.report.options import ReportOptions
 @option("-o, --output", OutputFile((".html", ".htm"), "a page (.html)"), section="Page", metavar="FILE.html")
 @option("--title", Text("TEXT"), section="Page")
 @option("--images", DIR, section="Page")
-@option("--gallery", Number("N", at_least=0, whole=True), section="Page")
-@option("--fetch", FLAG, section="Page")
+@option("--gallery", Number("N", at_least=0, whole=True), _PAGE, section="Page")
+@option("--fetch", FLAG, _PAGE, section="Page")
 @option("--svg", DIR, section="Charts for slides")
 @option("--pdf", DIR, section="Charts for slides")
 @option("--png", DIR, section="Charts for slides")

@@ -244,6 +244,9 @@ def run_rig(options: RigOptions) -> int:
         changes = {each.name: difference(rig.now(each), after.now(each), each) for each in QUANTITIES}
     calibration = calibration_finder(options.calibration)(rig.frames.files[-1])
     health = health_of(rig, calibration, 1.0 if calibration is None else _downscale(options.results[-1]))
+    if calibration is not None and (health is None or calibration.baseline is None):
+        lacks = "no pair was measured" if health is None else "it has no baseline"
+        notes.append(f"the calibration tells what misaligned views do to depth; no effect here: {lacks}")
     checks = run_checks(rig, options.gates, missing, changes.get(ROLL.name))
     found = Findings(rig, checks, after, changes, health)
     overwrite = options.running.overwrite
