@@ -390,8 +390,10 @@ def pieces_of(path: str) -> Iterator[tuple[str, bytes]]:
     parts = () if path == STREAM else part_names(list_names(path))
     if parts:
         yield from read_parts(path, parts)
-    else:
+    elif path == STREAM or not Path(path).is_dir():
         yield path, read_named(path)
+    elif read_run(path) is None:  # else a run has no rows yet, or its shard has none
+        raise InputError(f"{path}: is a folder without parts of a result, such as part-00000.parquet")
 
 
 def cells_of(data: bytes, name: str, wanted: Sequence[str]) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
