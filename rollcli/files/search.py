@@ -312,7 +312,8 @@ def _without_views(folder: str, files: Iterator[tuple[str, str]]) -> Iterator[tu
 def _as_pairs(left: str, right: str) -> str:
     """Say what to type for pairs; they are not taken as such, since scripts should say which they mean."""
     command = shlex.join(["--left", left, "--right", right])
-    return f"it holds the left and right views of pairs: give {command}; or name its maps alone"
+    rest = ", and --exclude what is neither" if left == right else ""
+    return f"it holds the left and right views of pairs: give {command}{rest}; or name its maps alone"
 
 
 def _matches(pattern: str) -> Iterator[str]:
