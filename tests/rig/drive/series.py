@@ -39,8 +39,8 @@ def drive(
 ):
     """Values and their standard errors; `gross` is the share of outliers, all to one side.
 
-    `bumps` and `sways` are standard deviations of what comes on top of the AR(1): another movement each frame,
-    and a body that swings on its springs with a period of 8 frames.
+    `bumps` and `sways` are standard deviations of what comes on top of the AR(1): a movement of each frame
+    alone, and a body that swings on its springs with a period of 8 frames.
     """
     rng = np.random.default_rng(seed)
     own = rng.uniform(*errors, frames)
