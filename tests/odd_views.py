@@ -44,14 +44,15 @@ def seen_turned(view, yaw_deg=0.0, pitch_deg=0.0, focal=0.7):
     return cv2.warpPerspective(view, seen, (width, height), **how)
 
 
-def seen_rolled(spec, clockwise_deg):
-    """What the right camera of a frame sees that is rolled: its image is turned about its principal point."""
+def seen_rolled(spec, clockwise_deg, larger_percent=0.0):
+    """What a right camera sees that is rolled or of a longer focal length, about its principal point."""
     scene = build_scene(spec)
     camera = spec.cameras(scene.normal)[1]
     right, down, ahead = camera.axes
     cosine, sine = math.cos(math.radians(clockwise_deg)), math.sin(math.radians(clockwise_deg))
     axes = np.array([cosine * right - sine * down, sine * right + cosine * down, ahead])
-    light = render_view(scene, dataclasses.replace(camera, axes=axes)).light
+    focal = camera.focal * (1 + larger_percent / 100)
+    light = render_view(scene, dataclasses.replace(camera, axes=axes, focal=focal)).light
     # noise of its own, not that of the left view
     rng = np.random.default_rng([spec.seed, spec.index, Stream.SENSOR])
     return expose(light, spec.noise, spec.gain, spec.colour, rng)

@@ -127,6 +127,10 @@ class Calibration:
             return False
         return max((self.cx + 0.5) / self.width, (self.cy + 0.5) / self.height) > 1 - _EDGE
 
+    def right_axis(self, width: int, height: int) -> tuple[float, float]:
+        """Return the right view's principal point from the middle of an image of this size, px."""
+        return self.cx + self.doffs - (width - 1) / 2, self.cy - (height - 1) / 2
+
     def seems_of_another_size(self, width: int, height: int) -> str:
         """Say that numbers without a size seem to be of images of another size than this; else empty.
 

@@ -106,6 +106,9 @@ class Source:
         What else a row says of the map; no reason for doubt.
     alignment : mapping of str to float
         How the right view lay, by column of a result; empty for a map, and where that could not be told.
+    levelled : tuple of float
+        By which share the right view was made smaller, and how far it was turned counter-clockwise, radians:
+        both about the middle of the image.
     size : tuple of int, or None
         Width and height of the images in the files, px, where the map was matched from them.
     match : StereoMatch or None
@@ -124,6 +127,7 @@ class Source:
     doubts: Mapping[str, str] = field(default_factory=dict)
     note: str = ""
     alignment: Mapping[str, Any] = field(default_factory=dict)
+    levelled: tuple[float, float] = (0.0, 0.0)
     size: tuple[int, int] | None = None
     match: "StereoMatch | None" = None
     photo: NDArray[Any] | None = None
@@ -155,13 +159,15 @@ class Source:
         doubt = "; ".join(text for code, text in self.doubts.items() if text and code != "beyond")
         if not (self.slope_error or doubt or self.alignment):
             return ""
-        return json.dumps({"slope_error": self.slope_error, "doubt": doubt, "alignment": self.alignment})
+        carried = {"slope_error": self.slope_error, "doubt": doubt, "alignment": self.alignment}
+        return json.dumps({**carried, "levelled": self.levelled})
 
     def calibrated(self, calibration: Calibration | None) -> Calibration | None:
         """Return the calibration of the map, from that of the images in the files; none stays none.
 
-        Its `doffs` has what levelling has put into all disparities: a right camera that is rolled turns its
-        view about the principal point, and levelling turns it back about the middle of the image.
+        Its `doffs` has what levelling has put into all disparities: a right camera that is rolled, or of a
+        longer focal length, turns and enlarges its view about the principal point, and levelling undoes that
+        about the middle of the image.
 
         Raises
         ------
@@ -174,11 +180,9 @@ class Source:
             calibration = calibration.for_size(*self.size)
         height, width = self.disparity.shape
         calibration = calibration.for_size(width, height)
-        clockwise = math.radians(self.alignment.get("right_clockwise_deg", 0.0))
-        if not (clockwise and self.slope_error):  # nothing was levelled
-            return calibration
-        below = calibration.cy - (height - 1) / 2
-        return replace(calibration, doffs=calibration.doffs + clockwise * below)
+        larger, clockwise = self.levelled
+        right, below = calibration.right_axis(width, height)
+        return replace(calibration, doffs=calibration.doffs + clockwise * below - larger * right)
 
     @property
     def shown(self) -> NDArray[Any]:
@@ -214,7 +218,7 @@ def _read(frame: Frame, options: FrameOptions) -> Source:
     found = to_disparity(stored, **given._asdict(), calibration=frame.calibration)
     encoding = found.encoding.value
     beyond = {"beyond": too_large(found.disparity, stored, encoding)}
-    error, doubt, alignment = _carried(stored.text)
+    error, doubt, alignment, levelled = _carried(stored.text)
     # the roll is the same at any scale, pitch and height are not
     doubts = {"carried": doubt, **(beyond if frame.calibration is not None else {})}
     return Source(
@@ -225,11 +229,16 @@ def _read(frame: Frame, options: FrameOptions) -> Source:
         slope_error=error,
         doubts=doubts,
         alignment=alignment,
+        levelled=levelled,
     )
 
 
-def _carried(text: str) -> tuple[float, str, Mapping[str, float]]:
-    """Read from a map's file how far the map may be believed: slope error, doubt and alignment of a `Source`.
+_Carried = tuple[float, str, Mapping[str, float], tuple[float, float]]
+_NOTHING: _Carried = 0.0, "", {}, (0.0, 0.0)
+
+
+def _carried(text: str) -> _Carried:
+    """Read from a map's file how the map was made: slope error, doubt, alignment and levelling of a `Source`.
 
     Nothing is known where another program has written or changed it.
     """
@@ -237,11 +246,13 @@ def _carried(text: str) -> tuple[float, str, Mapping[str, float]]:
         carried = json.loads(text)
         error, doubt, lay = float(carried["slope_error"]), carried["doubt"], carried["alignment"]
         alignment = {name: float(lay[name]) for name in ALIGNMENT_COLUMNS if name in lay}
+        larger, clockwise = map(float, carried.get("levelled", _NOTHING[3]))  # earlier files have none
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
-        return 0.0, "", {}
-    if not (0 <= error < math.inf and isinstance(doubt, str) and all(map(math.isfinite, alignment.values()))):
-        return 0.0, "", {}
-    return error, one_line(doubt), alignment
+        return _NOTHING
+    numbers = (error, larger, clockwise, *alignment.values())
+    if not (error >= 0 and isinstance(doubt, str) and all(map(math.isfinite, numbers))):
+        return _NOTHING
+    return error, one_line(doubt), alignment, (larger, clockwise)
 
 
 def _match(frame: Frame, options: FrameOptions) -> Source:
@@ -297,6 +308,7 @@ def matched_source(
         doubts={"range": _doubt_of_range(match), "match": match.doubt},
         note=_LACKS_ROAD if match.lacks_road else "",
         alignment=alignment,
+        levelled=(round(match.larger, 8), round(match.corrected.rotation, 8)),
         size=(width, height),
         match=match,
     )

@@ -119,6 +119,8 @@ class StereoMatch:
         Share of the valid pixels within a pixel of the range's end: if large, the range was too short.
     corrected : Misalignment
         What the right view was levelled by, pixels of the size matched at; `LEVEL` if it was left as it is.
+    larger : float
+        By which share the right view's columns are believed to have been larger, which the map is free of.
     measured : Measured or None
         How the right view lies, with the standard error of each part, px of the size matched at; None where
         that was not asked, or could not be told.
@@ -139,6 +141,7 @@ class StereoMatch:
     num_disparities: int
     end_fraction: float
     corrected: Misalignment
+    larger: float
     measured: Measured | None
     lacks_road: bool
     slope_error: float
@@ -309,6 +312,7 @@ def match_pair(
         num_disparities=count,
         end_fraction=np.count_nonzero(at_end) / valid if valid else 0.0,
         corrected=corrected,
+        larger=support.scale,
         measured=measured,
         lacks_road=pair.lacks_road,
         slope_error=support.error,

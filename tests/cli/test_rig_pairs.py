@@ -129,6 +129,18 @@ def test_the_matrix_brings_the_right_view_back(pairs):
     assert (np.array(found["matrix"]) @ corner)[:2] == pytest.approx(expected, abs=0.15)
 
 
+def test_the_matrix_enlarges_columns_as_is_believed_and_keeps_that_of_the_principal_point(pairs):
+    sized = "cam0=[336 0 259.5; 0 336 159.5; 0 0 1]\nbaseline=540\nwidth=480\nheight=360\n"
+    (pairs / "off_middle.txt").write_text(sized)
+    asked = ("--calib", "off_middle.txt", "--correction", "axis.json", "--overwrite", "-q")
+    assert rollcli("rig", "off.csv", *asked, cwd=pairs).status == 0
+    found = json.loads((pairs / "axis.json").read_text())
+    matrix = np.array(found["matrix"])
+    assert (matrix @ [259.5, 159.5, 1.0])[0] == pytest.approx(259.5)
+    assert matrix[0, 0] - 1 == pytest.approx(found["columns"]["scale"], abs=1e-6)
+    assert matrix[1, 1] - 1 == pytest.approx(found["right_larger_percent"] / 100, abs=1e-5)
+
+
 def test_a_pair_that_contradicts_the_correction_is_suspect(pairs):
     first = ("--left", "left/frame_000[12].png", "--right", "right/frame_000[12].png")
     done = rollcli("estimate", *first, "--align", "use.json", cwd=pairs)
