@@ -194,6 +194,12 @@ def test_numbers_and_rows_of_numpy_are_taken_or_refused_in_words():
     assert np.array_equal(*given)
     with pytest.raises(rollcli.InputError, match="the left image is no array of pixels"):
         rollcli.compute_disparity(left[0], right[0])
+    with pytest.raises(rollcli.UsageError, match="what is of type NoneType is no estimate"):
+        rollcli.height_map(typed_client.road(0.1), None)
+    with pytest.raises(rollcli.UsageError, match="at most 65535 bins"):
+        rollcli.v_disparity(typed_client.road(0.1), bins=10**9)
+    with pytest.raises(rollcli.UsageError, match="1 origins of 2 rows: give one for each, or none"):
+        rollcli.assess_rig({"roll_deg": [1, 1], "status": ["ok", "ok"]}, origins=["a"])
     with pytest.raises(rollcli.UsageError, match="what is of type ndarray is no calibration"):
         rollcli.estimate_roll(typed_client.road(0.1), calibration=left)
 

@@ -325,16 +325,18 @@ def _use(ctx: click.Context, param: click.Parameter, path: str | None) -> None:
         return
     commands, options, defaults = _commands(ctx), _options(ctx.command), {}
     for words, values in _tables(_load(path)):
-        if words and values and " ".join(words) not in commands:
+        table = " ".join(words)
+        group = not values and any(each.startswith(f"{table} ") for each in commands)
+        if words and table not in commands and not group:
             raise click.UsageError(f"{path}: there is no command for the table [{'.'.join(words)}]", ctx)
-        if words not in ((), tuple(ctx.command_path.split(" ")[1:])):
-            continue
+        of_table = [commands[table]] if table in commands else commands.values()
         for key, value in values.items():
             name = key.replace("-", "_")
-            if name in options:
+            if name in options and words in ((), tuple(ctx.command_path.split(" ")[1:])):
                 defaults[name] = _checked(ctx, options[name], value, path)
-            elif words or not any(name in _options(each) for each in commands.values()):
-                close = nearest(name, options, cutoff=0).replace("_", "-")
+            elif not any(name in _options(each) for each in of_table):
+                close = nearest(name, _options(commands[table]) if words else options, cutoff=0)
+                close = close.replace("_", "-")
                 hint = f"; the nearest is {close!r}" if close else ""
                 raise click.UsageError(f"{path}: there is no option {key!r}{hint}", ctx)
     ctx.default_map = {**(ctx.default_map or {}), **defaults}

@@ -249,7 +249,11 @@ image_options = record(
 )
 
 _running = (
-    option("-j, --jobs", Number("N", at_least=1, whole=True)),
+    option(
+        "-j, --jobs",
+        Number("N", at_least=1, whole=True),
+        Needs(lambda ctx: not ctx.params.get("scheduler"), "the workers of --scheduler do the work"),
+    ),
     option("--overwrite", FLAG),
     option("--dry-run", FLAG),
     option("-q, --quiet", FLAG),

@@ -15,8 +15,15 @@ from pathlib import Path
 
 from rollcli.errors import UsageError, reading
 from rollcli.files.atomic import is_file, is_folder, mode_of
-from rollcli.files.containers import frame_name, is_archive, members, refuse_packed
-from rollcli.files.stores.locations import base_name, is_object_url, is_url, public_name, split_url
+from rollcli.files.containers import file_of, frame_name, is_archive, members, refuse_packed
+from rollcli.files.stores.locations import (
+    base_name,
+    is_object_url,
+    is_url,
+    public_name,
+    require_local,
+    split_url,
+)
 from rollcli.files.stores.objects import has_objects, list_objects
 
 MAP_ENDINGS = (".png", ".tif", ".tiff", ".npy", ".npz", ".pfm", ".exr")
@@ -272,6 +279,8 @@ class Search:
         """Yield the objects behind a URL: one, or those of a prefix or pattern that are readable."""
         pattern = not literal and is_object_url(url) and glob.has_magic(url)
         if not pattern and (literal or not is_folder_url(url)):
+            if is_archive(base_name(url)):
+                require_local(url, "archives are read from local disk: download it first")
             return self._named(url, base_name(url))
         found = objects_behind(url, recursive=self.recursive)
         wanted = (each for each in found if not each[0].startswith(self._skipped_urls))
@@ -303,8 +312,9 @@ def _without_views(folder: str, files: Iterator[tuple[str, str]]) -> Iterator[tu
                 other, there = sides.setdefault("/".join([*above, "*"]), (side, here))
                 if other != side:
                     both = (there, here) if side == 1 else (here, there)
-                    inside = not is_archive(folder)
-                    left, right = (f"{folder}/{each}".rstrip("/") if inside else folder for each in both)
+                    holder = file_of(path)  # an archive is given whole
+                    alone = holder == path
+                    left, right = (f"{folder}/{each}".rstrip("/") if alone else holder for each in both)
                     raise UsageError(f"{folder}: {_as_pairs(left, right)}")
         yield path, relative
 

@@ -143,7 +143,7 @@ def height_map(
     Raises
     ------
     UsageError
-        The map is not of the estimate's size, or the calibration is of another view.
+        The map is not of the estimate's size, this is no estimate, or the calibration is of another view.
 
     Examples
     --------
@@ -160,6 +160,9 @@ def height_map(
     True
     """
     values = map_of(disparity)
+    if not isinstance(estimate, RollEstimate):
+        kind = type(estimate).__name__
+        raise UsageError(f"what is of type {kind} is no estimate: give what rollcli.estimate_roll returned")
     require_calibration(calibration)
     return heights_over(values, FittedRoad.of_estimate(estimate), calibration)
 

@@ -14,7 +14,7 @@ from rollcli.estimator.moments import map_of, strips
 from rollcli.estimator.road.model import Parabola
 from rollcli.pictures.overlay import Pixels, round_step
 
-_MAX_BINS = 1024
+_MAX_BINS, _MOST_BINS = 1024, 65535  # unless asked for; and ever, as an image of that width
 _BLOCK = 1 << 22  # pixels counted at a time: a large map would take 40 bytes a pixel
 
 
@@ -44,14 +44,15 @@ def v_disparity(
     disparity : array_like, shape (H, W)
         Pixels; NaN, inf, <= 0 and what a masked array hides are no data.
     bins : int, optional
-        By default one a pixel for maps of whole pixels, else four a pixel and at least 256; at most 1024.
+        At most 65535; by default one a pixel for maps of whole pixels, else four a pixel and at least 256,
+        within 1024.
     max_disparity : float, optional
         Pixels; by default just above the largest of the map.
 
     Raises
     ------
     UsageError
-        bins or max_disparity is not positive, or the array is not 2-D.
+        bins or max_disparity is not positive, there are too many bins, or the array is not 2-D.
 
     Examples
     --------
@@ -66,8 +67,9 @@ def v_disparity(
     blocks = [values[rows] for rows in strips(len(values), _BLOCK // max(1, values.shape[1]))]
     if max_disparity is None:
         max_disparity = math.floor(max((_pixels(each).max(initial=0) for each in blocks), default=0)) + 1.0
-    if not 0 < max_disparity < math.inf or (bins is not None and bins < 1):
-        raise UsageError(f"bins {bins} and max-disparity {max_disparity}: both must be positive")
+    if not 0 < max_disparity < math.inf or not (bins is None or 0 < bins <= _MOST_BINS):
+        most = f"at most {_MOST_BINS} bins"
+        raise UsageError(f"bins {bins} and max-disparity {max_disparity}: both must be positive, {most}")
     if bins is None:
         whole = all(bool((pixels == np.rint(pixels)).all()) for pixels in map(_pixels, blocks))
         bins = min(math.ceil(max_disparity) if whole else max(256, math.ceil(4 * max_disparity)), _MAX_BINS)

@@ -1,5 +1,6 @@
 """For Python: the roll of a map, and of a pair, as `rollcli estimate` finds it; the frames of a recording."""
 
+import math
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -270,8 +271,8 @@ def open_recording(
     Raises
     ------
     UsageError
-        This is no recording, a topic is missing or not clear, the views of a video are not told, or the extra
-        is not installed.
+        This is no recording, a topic is missing or not clear, the views of a video are not told, an argument
+        is of no use here, or the extra is not installed.
     InputError
         A frame cannot be read; of a broken recording behind its last whole frame.
 
@@ -294,6 +295,10 @@ def open_recording(
         if not files:
             raise UsageError(f"{name}: is no .bag, .db3, .mcap or rosbag2 folder")
         require_extra("bags", name)
+        if side_by_side or right or (topic and left_topic):
+            raise UsageError(f"{name}: is a bag: give topic, or left_topic and right_topic, and nothing else")
+        if not 0 <= sync_tolerance < math.inf:
+            raise UsageError(f"a sync_tolerance of {sync_tolerance} s: give 0 or more")
         if left_topic is not None and right_topic is not None:
             found = pairs_of_bag(files, name, left_topic, right_topic, round(sync_tolerance * 1e9))
         elif left_topic is not None or right_topic is not None:

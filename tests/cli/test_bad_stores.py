@@ -76,10 +76,19 @@ def test_what_a_store_objects_to_is_said_before_any_work(bucket, store, tmp_path
         (["rig", "s3://maps/none.csv"], "there is no such object"),
         (["estimate", *VIEWS, "--align", "s3://maps/none.json"], "there is no such object"),
         (["evaluate", "paper", "maps", "-o", "s3://nowhere/p"], "there is no such bucket"),
+        (["estimate", "s3://maps/run.zip"], "archives are read from local disk: download it first"),
+        (["estimate", "https://host/run.tar?key=1"], "host/run.tar: archives are read from local disk"),
+        (["estimate", "http://user:word@127.0.0.1:9/a.png"], "are asked without user and password"),
+        (["rig", "http://user:word@127.0.0.1:9/rolls.csv"], "are asked without user and password"),
     ],
 )
 def test_a_wrong_address_is_one_line_before_any_work(bucket, tmp_path, words, said):
     assert said in refusal(tmp_path, *words)
+
+
+def test_an_endpoint_without_its_scheme_is_no_address(bucket, tmp_path):
+    said = "AWS_ENDPOINT_URL: is no address; write it as https://host, or http://host:9000"
+    assert said in refusal(tmp_path, "estimate", "s3://maps/a.png", AWS_ENDPOINT_URL="localhost:9000")
 
 
 @pytest.mark.parametrize("place", ["s3://maps/a.png", "s3://maps/"])

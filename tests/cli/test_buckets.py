@@ -49,6 +49,22 @@ def test_images_of_kept_rows_that_are_missing_are_made_again(bucket, tmp_path, p
     assert objects_below(level) == images
 
 
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_a_shard_without_frames_is_a_result_without_rows(bucket, tmp_path, form):
+    results = [f"{bucket}/{shard}.{form}" for shard in range(1, 7)]
+    for shard, result in enumerate(results, 1):
+        line = ("estimate", f"{bucket}/maps", "-o", result, "--shard", f"{shard}/6", "-q")
+        assert rollcli(*line, cwd=tmp_path).status == 0
+    assert f"6.{form}: has no rows" in rollcli("rig", results[-1], cwd=tmp_path).refused()
+    assert "(5 of 5 frames)" in rollcli("rig", *results, cwd=tmp_path).out
+
+
+def test_the_case_of_a_scheme_does_not_matter(bucket, tmp_path):
+    upper = bucket.replace("s3://", "S3://")
+    done = rollcli("estimate", f"{upper}/maps", cwd=tmp_path)
+    assert (done.status, done.out.count(f"{upper}/maps/frame")) == (0, 5), done.err
+
+
 def test_a_prefix_with_a_dot_is_a_folder_where_objects_lie_below_it(tmp_path, bucket, store):
     write_maps(tmp_path / "maps", 2)
     upload(tmp_path / "maps", f"{bucket}/2024.05.01")

@@ -247,7 +247,7 @@ def list_objects(url: str) -> Iterator[tuple[str, int, str]]:
         There is no such bucket, or it may not be listed.
     """
     store, prefix = _open(url)
-    root = split_url(url)[0]
+    root = url[: len(split_url(url)[0])]  # as it is written: a scheme may be in capitals
     with _telling(url, "listed", UsageError):
         for found in _listed(store, prefix.rstrip("/") or None):
             yield f"{root}/{found['path']}", found["size"], found["e_tag"] or ""
@@ -325,8 +325,12 @@ def _store(root: str, process: int) -> Any:
 
     seconds = request_seconds()
     client = {"connect_timeout": f"{_CONNECT_S}s", "timeout": f"{seconds:g}s"}
-    if os.environ.get("AWS_ENDPOINT_URL", os.environ.get("AWS_ENDPOINT", "")).startswith("http://"):
+    endpoint = os.environ.get("AWS_ENDPOINT_URL", os.environ.get("AWS_ENDPOINT", ""))
+    if endpoint.startswith("http://"):
         client["allow_http"] = "true"
+    elif endpoint and not endpoint.startswith("https://") and root[:2].lower() == "s3":
+        # obstore panics there
+        raise UsageError("AWS_ENDPOINT_URL: is no address; write it as https://host, or http://host:9000")
     retry: Any = {"max_retries": _RETRIES, "retry_timeout": timedelta(seconds=max(_RETRY_S, 2 * seconds))}
     try:
         return from_url(root, client_options=client, retry_config=retry)  # type: ignore[call-overload]

@@ -7,12 +7,13 @@ import urllib.request
 
 from rollcli.errors import InputError
 from rollcli.files.bounded import MOST_BYTES, in_words, too_large
-from rollcli.files.stores.locations import public_name, wait_for_room, waiting_for_network
+from rollcli.files.stores.locations import public_name, store_of, wait_for_room, waiting_for_network
 from rollcli.files.stores.objects import TIMEOUT_VARIABLE, request_seconds, within_seconds
 
 _TRIES = 4
 _FIRST_PAUSE_S = 0.2
 _PIECE = 2**20  # bytes
+_PASSWORD = "servers are asked without user and password; take them out of the URL, or sign it"
 
 
 def read_web_file(url: str, most: int = MOST_BYTES) -> bytes:
@@ -32,6 +33,8 @@ def read_web_file(url: str, most: int = MOST_BYTES) -> bytes:
     UsageError
         That variable holds no number of seconds.
     """
+    if "@" in store_of(url):
+        raise InputError(f"{public_name(url)}: cannot be read: {_PASSWORD}", _PASSWORD)
     seconds = request_seconds()
     give_up = time.monotonic() + seconds
     for attempt in range(_TRIES):
@@ -52,6 +55,8 @@ def read_web_file(url: str, most: int = MOST_BYTES) -> bytes:
 
 def web_problem(url: str) -> str:
     """Say why a server refuses a file that it may have; empty where it does not refuse it."""
+    if "@" in store_of(url):
+        return _PASSWORD
     try:
         request = urllib.request.Request(url, headers={"Range": "bytes=0-0"})
         urllib.request.urlopen(request, timeout=request_seconds()).close()

@@ -284,6 +284,8 @@ def assess_rig(
     ([300], 1.0)
     """
     frames = replace(_frames(rows), origins=origins)
+    if len(origins) not in (0, len(frames.files)):
+        raise UsageError(f"{len(origins)} origins of {len(frames.files)} rows: give one for each, or none")
     return assess_frames(frames, include_suspect=include_suspect, groups=groups)
 
 

@@ -259,6 +259,10 @@ def test_python_iterates_the_views_of_a_bag(tmp_path):
         list(package.open_recording(path, left_topic="/32FC1", right_topic="/grey"))
     with pytest.raises(UsageError, match="left_topic and right_topic are given together"):
         list(package.open_recording(path, left_topic="/grey"))
+    with pytest.raises(UsageError, match="is a bag: give topic, or left_topic and right_topic, and nothing"):
+        list(package.open_recording(path, topic="/32FC1", left_topic="/grey", right_topic="/grey"))
+    with pytest.raises(UsageError, match="a sync_tolerance of nan s: give 0 or more"):
+        list(package.open_recording(path, **late, sync_tolerance=float("nan")))
 
 
 def test_the_only_topic_of_maps_is_found_among_others_and_behind_damage(tmp_path):

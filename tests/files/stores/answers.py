@@ -182,7 +182,9 @@ def _of_silence():
         url = f"http://127.0.0.1:{silent.getsockname()[1]}"
         with mock.patch.dict(os.environ, {objects.TIMEOUT_VARIABLE: "0.05"}):
             said = [made(web.read_web_file, f"{url}/{SIGNED}")]
-    said += [made(web.read_web_file, f"{each}/{SIGNED}") for each in (url, "http://user:secret@[")]
+    said += [
+        made(web.read_web_file, f"{each}/{SIGNED}") for each in (url, "http://[", "http://user:secret@[")
+    ]
     return [each.replace(url, "ADDRESS") for each in said]
 
 
