@@ -30,6 +30,7 @@ MAP_ENDINGS = (".png", ".tif", ".tiff", ".npy", ".npz", ".pfm", ".exr")
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm")
 _OTHER_ENDINGS = (".csv", ".jsonl", ".parquet", ".txt", ".json", ".yaml", ".yml", ".xml", ".toml")
 _OF_FILES = {*MAP_ENDINGS, *IMAGE_ENDINGS, *_OTHER_ENDINGS}
+_BOTH = "is an input and an output folder; write the results elsewhere"
 LEAVE_NONE = "--include and --exclude leave none"
 _MAGIC = re.compile(r"[*?[]")
 
@@ -219,7 +220,7 @@ class Search:
         """Yield readable files, except hidden ones."""
         skipped = {_identity(each) for each in self._skip} - {_NOWHERE}
         if _identity(folder) in skipped:
-            raise UsageError(f"{folder}: is an input and an output folder; write the results elsewhere")
+            raise UsageError(f"{folder}: {_BOTH}")
         closed = skipped | {_identity(folder)}  # links may make a circle
         base = str(folder)
         cut = 0 if base == os.curdir else len(base.rstrip(os.sep)) + 1  # what stands before a relative path
@@ -282,10 +283,18 @@ class Search:
             if is_archive(base_name(url)):
                 require_local(url, "archives are read from local disk: download it first")
             return self._named(url, base_name(url))
-        found = objects_behind(url, recursive=self.recursive)
-        wanted = (each for each in found if not each[0].startswith(self._skipped_urls))
-        readable = ((each, below) for each, below in wanted if self._reads(each))
+        if f"{url.rstrip('/')}/" in self._skipped_urls:
+            raise UsageError(f"{url}: {_BOTH}")
+        readable = (
+            (each, below)
+            for each, below in objects_behind(url, recursive=self.recursive)
+            if self._reads(each) and not below.startswith(self._skipped_below(each.removesuffix(below)))
+        )
         return self._wanted(url, readable, "pattern" if pattern else "folder")
+
+    def _skipped_below(self, base: str) -> tuple[str, ...]:
+        skipped = (each for each in self._skipped_urls if each.startswith(base) and each != base)
+        return tuple(each.removeprefix(base) for each in skipped)
 
     def _reads(self, name: str) -> bool:
         return name.lower().endswith(self.endings)

@@ -65,6 +65,14 @@ def test_the_case_of_a_scheme_does_not_matter(bucket, tmp_path):
     assert (done.status, done.out.count(f"{upper}/maps/frame")) == (0, 5), done.err
 
 
+def test_outputs_are_not_searched_but_what_lies_beside_them_is(bucket, tmp_path):
+    line = ("derotate", "--roll", "1", "--recursive", "--dry-run", "-o")
+    both = rollcli(*line, f"{bucket}/maps", f"{bucket}/maps", cwd=tmp_path).refused()
+    assert f"{bucket}/maps: is an input and an output folder; write the results elsewhere" in both
+    assert rollcli(*line, bucket, f"{bucket}/maps", cwd=tmp_path).out.count("read ") == 5
+    assert "no input found" in rollcli(*line, f"{bucket}/maps", bucket, cwd=tmp_path).refused()
+
+
 def test_a_prefix_with_a_dot_is_a_folder_where_objects_lie_below_it(tmp_path, bucket, store):
     write_maps(tmp_path / "maps", 2)
     upload(tmp_path / "maps", f"{bucket}/2024.05.01")
