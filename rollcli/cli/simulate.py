@@ -51,7 +51,8 @@ def simulate(ctx: click.Context, /, folder: str, options: SimulateOptions, runni
     """Render road stereo pairs with known roll into DIR.
 
     Writes DIR/left and DIR/right (8-bit PNG), DIR/disparity (the true disparity of the left view, 16-bit
-    KITTI PNG), DIR/calib.txt (the calibration in KITTI's form) and DIR/truth.csv.
+    KITTI PNG), DIR/calib.txt (the calibration in KITTI's form; with --principal-offset DIR/calib, a file a
+    frame) and DIR/truth.csv.
 
     Examples
     --------
