@@ -19,7 +19,7 @@ from rollcli.errors import InputError, UsageError
 from rollcli.extras import require_extra
 from rollcli.files.bounded import as_utf8
 from rollcli.files.storage import STREAM, list_names, read_bytes, read_named
-from rollcli.files.stores.locations import is_url, is_web_url, public_name
+from rollcli.files.stores.locations import is_url, is_web_url, public_name, within
 from rollcli.files.stores.objects import NO_OBJECT
 from rollcli.rig.quantities import BOUNDS
 
@@ -199,8 +199,9 @@ def read_parts(folder: str, names: Iterable[str], header: bytes = b"") -> Iterat
         A part cannot be read.
     """
     for name in names:
-        part = read_bytes(f"{folder}/{name}")
-        yield f"{folder}/{name}", header + part
+        place = within(folder, name)
+        part = read_bytes(place)
+        yield place, header + part
         if name.endswith(".csv") and not header:
             header, end, _ = part.partition(b"\n")
             if not end:

@@ -27,7 +27,8 @@ class Plan:
     @property
     def output(self) -> str:
         """Where the rows go."""
-        return self.options.result.output
+        output = self.options.result.output
+        return output.rstrip("/") if self.in_parts else output
 
     @property
     def format(self) -> Format:
