@@ -31,14 +31,14 @@ class Found:
     score: float
 
 
-def search(series: Series, unit: float) -> Found:
+def search(series: Series, whole: Likelihood) -> Found:
     """Find the jumps of a series, and whether it drifts.
 
     Parameters
     ----------
     series : Series
-    unit : float
-        See `Likelihood`.
+    whole : Likelihood
+        Of the cells of the series without a jump.
 
     Returns
     -------
@@ -47,19 +47,18 @@ def search(series: Series, unit: float) -> Found:
     """
     if series.used.sum() < TUNING.searched:
         return Found((), False, 0.0)
-    seen = _Search(series, unit)
+    seen = _Search(whole)
     places = np.flatnonzero(series.used)
     spanned = 2 * (places[-1] - places[0]) >= len(series.values)  # else a line would be drawn out far
     found = max((seen.jumps(drift) for drift in (False, True)[: 1 + spanned]), key=lambda each: each.score)
-    return Found(tuple(_placed(series, found, unit, seen.cells.width)), found.drift, found.score)
+    return Found(tuple(_placed(series, found, whole)), found.drift, found.score)
 
 
 class _Search:
     """Adds jumps one by one or two by two as long as the score grows, and takes needless ones away."""
 
-    def __init__(self, series: Series, unit: float) -> None:
-        self.cells = make_cells(series)
-        self._likelihood = Likelihood(self.cells, unit)
+    def __init__(self, likelihood: Likelihood) -> None:
+        self.cells, self._likelihood = likelihood.cells, likelihood
         self._gap = max(TUNING.shortest, TUNING.shortest_share * self.cells.frames)
 
     def jumps(self, drift: bool) -> Found:
@@ -119,18 +118,18 @@ class _Search:
         )
 
 
-def _placed(series: Series, found: Found, unit: float, width: int) -> list[int]:
+def _placed(series: Series, found: Found, whole: Likelihood) -> list[int]:
     """Return the frames of jumps that were found to a cell: looked at again in smaller and smaller cells."""
     starts = list(found.starts)
     for place in range(len(starts)):
         low, start, high = ([0, *starts, len(series.values)])[place : place + 3]
-        cell = width
+        cell = whole.cells.width
         while cell > 1:
             side = max(round(_SIDE * cell), _FEWEST)
             begin, end = max(low, start - side), min(high, start + side)
             part = series.part(begin, end)
             cells = make_cells(part, most=TUNING.cells // 2)
-            likelihood, level = Likelihood(cells, unit), np.ones((len(cells.first), 1))
+            likelihood, level = Likelihood(cells, whole.unit), np.ones((len(cells.first), 1))
             near = np.abs(cells.first + begin - start) <= 1.5 * cell
             if not near.any() or cells.width >= cell:
                 break

@@ -111,7 +111,8 @@ class SequenceAssessment:
         if not self.used:
             return [Estimate()] * (len(starts) + 1)
         edges = sorted({*starts, *self.starts})
-        fitted = _Fitted(self.series, edges, self.drifts, self.unit)
+        likelihood = Likelihood(make_cells(self.series, edges), self.unit)
+        fitted = _Fitted(self.series, likelihood, edges, self.drifts)
         return [fitted.mean_over(first, end) for first, end in bounds_of(starts, self.frames)]
 
 
@@ -146,8 +147,11 @@ def assess_sequence(values: ArrayLike, errors: ArrayLike, unit: float = 1.0) -> 
     if not used:
         nothing = Estimate()
         return SequenceAssessment(len(given), 0, outliers, (), (), nothing, False, "few", None, series, unit)
-    found = search(series, unit)
-    fitted = _Fitted(series, found.starts, found.drift, unit)
+    likelihood = Likelihood(make_cells(series), unit)
+    found = search(series, likelihood)
+    if found.starts:
+        likelihood = Likelihood(make_cells(series, found.starts), unit)
+    fitted = _Fitted(series, likelihood, found.starts, found.drift)
     jumps = tuple(
         Jump(start, fitted.estimate(fitted.level(place + 1, start) - fitted.level(place, start)))
         for place, start in enumerate(found.starts)
@@ -159,7 +163,7 @@ def assess_sequence(values: ArrayLike, errors: ArrayLike, unit: float = 1.0) -> 
         outliers=outliers,
         segments=tuple(fitted.segments()),
         jumps=jumps,
-        drift=(fitted if found.drift else _Fitted(series, found.starts, True, unit)).drift(),
+        drift=(fitted if found.drift else _Fitted(series, likelihood, found.starts, True)).drift(),
         drifts=found.drift,
         status="few" if used < TUNING.fewest else status,
         between_sd=fitted.between_sd(),
@@ -171,15 +175,15 @@ def assess_sequence(values: ArrayLike, errors: ArrayLike, unit: float = 1.0) -> 
 class _Fitted:
     """A series with its levels and its line."""
 
-    def __init__(self, series: Series, starts: Sequence[int], drift: bool, unit: float) -> None:
+    def __init__(self, series: Series, likelihood: Likelihood, starts: Sequence[int], drift: bool) -> None:
         self._series, self._starts, self._drift = series, starts, drift
-        self._cells = make_cells(series, starts)
+        self._cells = likelihood.cells
         design = self._cells.design(starts, drift)
         self._there: Flags = np.asarray(design.any(axis=0))  # a stretch may have no frame that counts
         # frames that count may all lie in a cell or two, which do not tell a drift
         if drift and np.linalg.matrix_rank(design[:, self._there]) < self._there.sum():
             self._there[-1] = False
-        self._fit: Fit = Likelihood(self._cells, unit).fit(design[:, self._there])
+        self._fit: Fit = likelihood.fit(design[:, self._there])
 
     def level(self, place: int, frame: float) -> Floats:
         """Return the contrast of a stretch's level, drawn out by the line, at a frame."""

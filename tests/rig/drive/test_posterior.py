@@ -34,7 +34,8 @@ def covariance_of(cells, place, noise):
         slow, fast = divmod(place - len(TUNING.correlations), len(TUNING.fast))
         left, period = TUNING.fast[fast]
         swings = left**distance * np.cos(2 * np.pi * distance / period)
-        correlation = (TUNING.slow[slow] ** distance + swings) / 2
+        share = TUNING.slow_share
+        correlation = share * TUNING.slow[slow] ** distance + (1 - share) * swings
     return spread**2 * correlation + factor * np.diag(cells.variances)
 
 
@@ -53,10 +54,11 @@ def test_each_noise_has_the_fit_of_statsmodels_and_the_likelihood_of_scipy(cells
     left = multivariate_normal(oracle.fittedvalues, covariance).logpdf(cells.values)
     level = np.linalg.slogdet(np.linalg.inv(oracle.normalized_cov_params))[1]
     spread = np.geomspace(*TUNING.spreads, TUNING.spread_steps)[noise // FACTORS]
-    several = len(TUNING.correlations) + len(TUNING.slow) * len(TUNING.fast)
-    others = (1 - TUNING.independent) / (several - 1)
+    alone = len(TUNING.correlations)
+    others = (1 - TUNING.two) * (1 - TUNING.independent) / (alone - 1)
+    probable = {0: (1 - TUNING.two) * TUNING.independent, **dict.fromkeys(range(1, alone), others)}
     prior = np.log(TUNING.error_factors[noise % FACTORS][1]) + TUNING.spread_power * np.log(spread)
-    prior += np.log(others if place else TUNING.independent)
+    prior += np.log(probable.get(place, TUNING.two / (len(TUNING.slow) * len(TUNING.fast))))
     expected = left - level / 2 + prior
     constant = len(cells.values) / 2 * np.log(2 * np.pi) + np.log(cells.variances).sum() / 2
     assert fit.log_evidence[place, noise] == pytest.approx(expected + constant, rel=1e-6)
@@ -139,10 +141,11 @@ def test_errors_that_are_said_too_small_do_not_make_the_interval_too_narrow():
 def test_a_slow_movement_under_a_faster_one_is_covered_and_seldom_a_jump(fast):
     found = [
         assess_sequence(*drive(seed, 400, level=0.0, phi=0.97, errors=(0.02, 0.1), **fast))
-        for seed in range(30)
+        for seed in range(1000, 1030)
     ]
-    assert sum(abs(rig.now.value) <= rig.now.ci95 for rig in found) >= 26
-    assert sum(bool(rig.jumps) for rig in found) <= 5
+    # of thirty; with one movement 15 and 12
+    assert sum(abs(rig.now.value) <= rig.now.ci95 for rig in found) >= 25
+    assert sum(bool(rig.jumps) for rig in found) <= 4
 
 
 @pytest.mark.parametrize("frames", mostly_slow([1, 2, 9, 200, 2000, 20_000], 1, 9, 200))
