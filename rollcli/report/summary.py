@@ -75,17 +75,19 @@ def _in_common(runs: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def option_lines(run: Mapping[str, Any] | None) -> list[tuple[str, str]]:
-    """Return the options that the run was given, by their names on the command line."""
+    """Return the options that the run was given, by their names on the command line, as they are typed."""
     options = (run or {}).get("options", {})
     given = {name: value for name, value in options.items() if value is not False and value not in (None, [])}
-    return [(f"--{name}", _shown(value)) for name, value in given.items()]
+    return [(f"--{name}", _shown(value, _BETWEEN.get(name, ","))) for name, value in given.items()]
 
 
-def _shown(value: Any) -> str:
+_BETWEEN = {"polygon": " ", "heights-range": ":", "invalid": " --invalid "}  # values of an option; else ","
+
+
+def _shown(value: Any, between: str = ",") -> str:
     if isinstance(value, list):
-        between = " " if value and isinstance(value[0], list) else ","
         return between.join(map(_shown, value))
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{value:.15g}" if isinstance(value, float) else str(value)
 
 
 def frame_count(count: int) -> str:

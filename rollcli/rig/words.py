@@ -72,7 +72,8 @@ def counts(rig: RigAssessment) -> str:
         )
         if count
     ]
-    return ", ".join([f"{rig.used:,} of {rig.count:,} frames", *left_out])
+    frames = f"{rig.count:,} frame" + "s" * (rig.count != 1)
+    return ", ".join([f"{rig.used:,} of {frames}", *left_out])
 
 
 def now_in_words(rig: RigAssessment, quantity: Quantity = ROLL) -> str:

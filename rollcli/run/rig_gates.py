@@ -107,7 +107,8 @@ class Health:
     def summary(self) -> str:
         """The verdict, with how far the right view is off."""
         off = answer(self.reach, PIXELS).lstrip("+")
-        return f"{self.verdict}: up to {off} off in the image ({self.frames:,} pairs)"
+        pairs = f"{self.frames:,} pair" + "s" * (self.frames != 1)
+        return f"{self.verdict}: up to {off} off in the image ({pairs})"
 
     @property
     def effect(self) -> str:
