@@ -1,4 +1,4 @@
-"""The paper's experiments on one map: accuracy, rotations, and run times (Tables I and II, Figs. 3 to 5)."""
+"""The paper's experiments on one map: accuracy, rotations, and run times (Tables I and II, Figs. 3 and 6)."""
 
 import math
 import timeit

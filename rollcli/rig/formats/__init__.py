@@ -1,1 +1,1 @@
-"""Calibration files, one module a format; `table` lists them."""
+"""The formats of calibration files; `FORMATS` of `read_calibration.py` lists them."""
