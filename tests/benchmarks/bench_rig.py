@@ -105,8 +105,8 @@ def _misses(rig, at: int) -> int:
 
 
 def short_drives(series: int, first: int) -> None:
-    """Print, for each cell: share inside, and the half-width against that of RIG.md E."""
-    print("short drives: inside the interval, median half-width, and as a share of the reference's")
+    """Print, for each cell: share inside, and the median half-width, also as a share of that in `SHORT`."""
+    print("short drives: inside the interval, median half-width, and as a share of the first trial's")
     inside = []
     for frames, references in SHORT.items():
         row = []

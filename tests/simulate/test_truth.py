@@ -13,7 +13,7 @@ SMALL = {"size": (320, 240), "focal": 186.0}
 
 
 def plane_roll(disparity, used):
-    """theta of METHOD.md, degrees: atan(-c1 / c2) of the plane c0 + c1 u + c2 v through the used pixels."""
+    """The roll, degrees: atan(-c1 / c2) of the plane c0 + c1 u + c2 v through the used pixels."""
     v, u = np.nonzero(used)
     design = np.stack([np.ones(len(u)), u - u.mean(), v - v.mean()], axis=1)
     _, c1, c2 = np.linalg.lstsq(design, disparity[used], rcond=None)[0]
