@@ -20,11 +20,12 @@ from rollcli.files.encodings import Encoding, to_disparity
 from rollcli.files.formats import Stored, decode_mask, read_image, read_stored
 from rollcli.files.results import ALIGNMENT_COLUMNS, Row
 from rollcli.files.storage import noting, read_bytes, state_of
-from rollcli.messages import one_line
+from rollcli.messages import one_line, printable
 from rollcli.rig.calibration import Calibration
 from rollcli.run.diagnosis import require_positive, too_large
 from rollcli.run.frame import Decoded, Frame, FrameResult, failed_frame
 from rollcli.run.options import FrameOptions, RegionOptions
+from rollcli.stereo.correction import LARGEST
 from rollcli.stereo.options import StereoOptions
 
 if TYPE_CHECKING:
@@ -240,7 +241,7 @@ _NOTHING: _Carried = 0.0, "", {}, (0.0, 0.0)
 def _carried(text: str) -> _Carried:
     """Read from a map's file how the map was made: slope error, doubt, alignment and levelling of a `Source`.
 
-    Nothing is known where another program has written or changed it.
+    Nothing is known where another program has written or changed it, or where no rig has such numbers.
     """
     try:
         carried = json.loads(text)
@@ -249,10 +250,12 @@ def _carried(text: str) -> _Carried:
         larger, clockwise = map(float, carried.get("levelled", _NOTHING[3]))  # earlier files have none
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
         return _NOTHING
-    numbers = (error, larger, clockwise, *alignment.values())
-    if not (error >= 0 and isinstance(doubt, str) and all(map(math.isfinite, numbers))):
+    most = dict(zip(ALIGNMENT_COLUMNS, LARGEST, strict=False))
+    levelled = ("right_larger_percent", 100 * larger), ("right_clockwise_deg", math.degrees(clockwise))
+    fits = all(abs(value) <= most[name] for name, value in (*alignment.items(), *levelled))
+    if not (0 <= error < math.inf and isinstance(doubt, str) and fits):
         return _NOTHING
-    return error, one_line(doubt), alignment, (larger, clockwise)
+    return error, printable(one_line(doubt)), alignment, (larger, clockwise)
 
 
 def _match(frame: Frame, options: FrameOptions) -> Source:

@@ -18,7 +18,7 @@ _OFFSET_CI95 = "right_lower_ci95_px"
 _COLUMNS = ("scale", "twist", "pitch", "slope_error", "pitch_error")  # as of a `ColumnSupport`
 _EARLIER = {"pitch_error": 0.0}  # files of before it came have none
 _REACH = 1.96  # standard errors: of an interval of 95 %
-_LARGEST = (100.0, 45.0, 50.0, 100.0, 100.0)  # of each; what is more is damage
+LARGEST = (100.0, 45.0, 50.0, 100.0, 100.0)  # of each; what is more is damage
 
 
 class DriveRows(NamedTuple):
@@ -112,8 +112,7 @@ def read_correction(path: str) -> Correction:
     except (ValueError, KeyError, TypeError, RecursionError, OverflowError) as error:
         raise UsageError(f"--align {path}: is no correction that `rollcli rig --correction` wrote") from error
     fits = all(
-        math.isfinite(each) and abs(each) <= most
-        for each, most in zip([*values, bend], _LARGEST, strict=True)
+        math.isfinite(each) and abs(each) <= most for each, most in zip([*values, bend], LARGEST, strict=True)
     )
     fits &= columns is None or all(map(math.isfinite, astuple(columns)))
     if not (fits and offset_error >= 0 and width > 0 and height > 0):

@@ -1,5 +1,6 @@
 """A pair, its map and the call in Python say the same."""
 
+import json
 import math
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 import rollcli as package
 from rollcli.files.results import ALIGNMENT_COLUMNS
 from rollcli.rig.calibration import Calibration
-from rollcli.run.read import Source, _carried
+from rollcli.run.read import _NOTHING, Source, _carried
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
@@ -149,3 +150,12 @@ def test_what_a_file_carries_is_read_back_and_what_others_wrote_is_not():
     lies = '{"slope_error": 0, "doubt": "", "alignment": {"right_lower_px": NaN, "right_twist_px": 1}}'
     for other in ("", "{}", "[1]", "null", '{"slope_error": -1, "doubt": "", "alignment": {}}', "no", lies):
         assert _carried(other) == (0.0, "", {}, (0.0, 0.0))
+
+
+def test_what_a_file_carries_cannot_break_a_result():
+    """No rig has such numbers, and readers of rows refuse them; a text holds nothing that UTF-8 cannot."""
+    whole = {"slope_error": 0.001, "doubt": "", "alignment": {"right_lower_px": 1.25}, "levelled": [0, 0]}
+    assert _carried(json.dumps(whole)) != _NOTHING
+    for damaged in ({"alignment": {"right_lower_px": 1e300}}, {"levelled": [1e30, 0]}, {"levelled": "12"}):
+        assert _carried(json.dumps(whole | damaged)) == _NOTHING
+    assert _carried(json.dumps(whole | {"doubt": "\ud800\x1b \n!"}))[1] == r"\ud800\x1b !"
