@@ -1,5 +1,6 @@
 """Disparity maps from stereo pairs: range found, views levelled, then one match."""
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -180,7 +181,7 @@ def compute_disparity(
     speckle_size: int = _DEFAULT.speckle_size,
     speckle_range: int = _DEFAULT.speckle_range,
     downscale: float = _DEFAULT.downscale,
-    align: str = _DEFAULT.align,
+    align: str | os.PathLike[str] = _DEFAULT.align,
     vertical_offset: float | None = _DEFAULT.vertical_offset,
 ) -> Map:
     """Return the disparity map of a rectified pair.

@@ -1,6 +1,8 @@
 """How pairs are matched; without OpenCV, so that a command line can be read without it."""
 
+import os
 from dataclasses import dataclass, replace
+from typing import SupportsIndex
 
 from rollcli.errors import UsageError
 from rollcli.stereo.correction import Correction, read_correction
@@ -19,6 +21,7 @@ _LIMITS = {
     "downscale": (1, 64),
     "vertical_offset": (-100, 100),
 }
+_NOT_WHOLE = ("downscale", "vertical_offset")
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,7 @@ class StereoOptions:
         Disparity step within a patch, pixels.
     downscale : float
         Match at 1/downscale of the size.
-    align : {"auto", "off"} or str
+    align : {"auto", "off"} or path
         Whether to measure how the right view lies against the left one, and to level it; or the file of a
         correction for all pairs.
     vertical_offset : float or None
@@ -60,20 +63,24 @@ class StereoOptions:
     speckle_size: int = 100
     speckle_range: int = 2
     downscale: float = 1.0
-    align: str = "auto"
+    align: str | os.PathLike[str] = "auto"
     vertical_offset: float | None = None
 
     def __post_init__(self) -> None:
         for name, (low, high) in _LIMITS.items():
             value = getattr(self, name)
-            if value is not None and not low <= value <= high:
+            if value is None and getattr(type(self), name) is None:
+                continue
+            if name not in _NOT_WHOLE and not isinstance(value, SupportsIndex):
+                raise UsageError(f"{name.replace('_', '-')} {value}: must be a whole number")
+            if not low <= value <= high:
                 raise UsageError(f"{name.replace('_', '-')} {value}: must be from {low} to {high}")
         if self.block_size % 2 == 0:
             raise UsageError(f"block-size {self.block_size}: must be odd")
         if self.mode not in MODES:
             raise UsageError(f"sgbm-mode {self.mode!r}: choose one of {', '.join(MODES)}")
         if self.align not in ALIGN:
-            read_correction(self.align)
+            read_correction(str(self.align))
 
     def given_alignment(self, width: int, height: int) -> Correction:
         """Return how the right view lies as the user says, of views of this size.
@@ -85,7 +92,7 @@ class StereoOptions:
         """
         if self.vertical_offset is not None or self.align in ALIGN:
             return Correction(Misalignment(float(self.vertical_offset or 0)), None, 0.0, width, height)
-        return read_correction(self.align).resized(width, height)
+        return read_correction(str(self.align)).resized(width, height)
 
     @property
     def is_default(self) -> bool:

@@ -209,7 +209,7 @@ def levelled_as_told(frame, folder, lower, **told):
     lies = {"right_lower_px": 1.0, "right_clockwise_deg": 0, "right_larger_percent": 0, "right_twist_px": 0}
     use = folder / "use.json"
     use.write_text(json.dumps({**lies, **told, "width": width, "height": height}))
-    return match_pair(frame.left, seen_by(frame.right, lower=lower), StereoOptions(align=str(use)))
+    return match_pair(frame.left, seen_by(frame.right, lower=lower), StereoOptions(align=use))
 
 
 @pytest.mark.parametrize(

@@ -199,7 +199,16 @@ def test_what_is_no_image_is_refused(image):
 
 
 @pytest.mark.parametrize(
-    "options", [{"block_size": 4}, {"downscale": math.nan}, {"mode": "bm"}, {"align": "on"}]
+    "options",
+    [
+        {"block_size": 4},
+        {"downscale": math.nan},
+        {"mode": "bm"},
+        {"align": "on"},
+        {"num_disparities": 64.5},
+        {"speckle_size": 10.0},
+        {"min_disparity": None},
+    ],
 )
 def test_options_that_make_no_sense_are_refused(options):
     name = next(iter(options)).replace("_", "-")
