@@ -147,7 +147,8 @@ class Calibration:
         return (
             f"{self.source}: states no image size, and its principal point {self.cx:g},{self.cy:g} is that "
             f"of images of about {2 * self.cx + 1:.0f}x{2 * self.cy + 1:.0f} px; "
-            f"these have {width}x{height}: pitch and height are wrong unless the calibration is of this size"
+            f"these have {width}x{height}: pitch and height are wrong, and the roll may be, unless the "
+            "calibration is of this size: give --focal and --principal-point of it"
         )
 
     def for_size(self, width: int, height: int) -> "Calibration":
