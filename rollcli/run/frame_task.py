@@ -52,7 +52,8 @@ def _estimated(frame: Frame, source: Source, options: FrameOptions) -> Made:
     request = options.method.request(source.slope_error, calibration)
     like = partial(looks_like, source.disparity, source.stored, options)
     how: dict[str, Any] = {"mask": source.allowed, "road_mask": options.images.road_mask is not None}
-    estimate, likeness = estimate_or_liken(source.disparity, request, like, **how)
+    with source.doubting():
+        estimate, likeness = estimate_or_liken(source.disparity, request, like, **how)
     # the images are turned by the angle of the pixels, which is not the rig's where fx and fy differ
     files, note = encode_images(frame, Pictured(source, estimate, options, calibration))
     if calibration is not None:

@@ -205,7 +205,8 @@ def estimate_pair(
     source = matched_source(left, right, stereo or StereoOptions(), road_finder(allowed, request))
     rig = source.calibrated(rig)
     request = replace(request, slope_error=source.slope_error, middle=None if rig is None else rig.cx)
-    estimate = estimator.estimate_roll(source.disparity, request, mask=allowed, road_mask=road_mask)
+    with source.doubting():
+        estimate = estimator.estimate_roll(source.disparity, request, mask=allowed, road_mask=road_mask)
     message = "; ".join(filter(None, [estimate.message, source.doubt, source.note]))
     estimate = replace(estimate, status="suspect" if source.doubt else estimate.status, message=message)
     return estimate if rig is None else with_pose(estimate, rig)

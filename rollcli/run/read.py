@@ -3,7 +3,7 @@
 import contextlib
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
@@ -152,6 +152,14 @@ class Source:
     def doubt(self) -> str:
         """All the doubts; empty when there is none."""
         return "; ".join(filter(None, self.doubts.values()))
+
+    @contextlib.contextmanager
+    def doubting(self) -> Iterator[None]:
+        """Add the doubts to what an estimate fails with: they may be why."""
+        try:
+            yield
+        except EstimationError as error:
+            raise EstimationError("; ".join(filter(None, [str(error), self.doubt]))) from error
 
     @property
     def text(self) -> str:

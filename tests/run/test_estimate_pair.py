@@ -139,6 +139,19 @@ def test_the_row_says_where_no_road_was_matched_along_its_plane(pair, tmp_path):
     assert [says in row["message"] for row in rows] == [True, False]
 
 
+def test_an_estimate_that_fails_says_why_the_map_may_be_wrong(tmp_path):
+    frame = render_frame(FrameSpec(scene="street", roll=math.radians(3), seed=12, colour=False))
+    write_views(tmp_path, "a.png", frame.left, frame.right)
+    run = rollcli("estimate", *VIEWS, "--num-disparities", "16", cwd=tmp_path)
+    (row,) = rows_of(run.out)
+    assert row["status"] == "error"
+    assert row["message"].startswith("no road: ")
+    assert "; use a larger --num-disparities" in row["message"]
+    with pytest.raises(package.EstimationError) as raised:
+        package.estimate_pair(frame.left, frame.right, stereo=package.StereoOptions(num_disparities=16))
+    assert str(raised.value) == row["message"]
+
+
 def test_what_a_file_carries_is_read_back_and_what_others_wrote_is_not():
     known = {"slope_error": 0.00125, "doubts": {"match": 'a "doubt"'}, "alignment": {"right_lower_px": 1.25}}
     text = Source(np.zeros((1, 1)), **known, levelled=(1e-3, -2e-3)).text
