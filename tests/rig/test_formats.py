@@ -149,3 +149,9 @@ def test_white_space_and_repeated_keys_take_a_time_in_proportion_to_their_number
     before = time.process_time()
     refusal(text)
     assert time.process_time() - before < 3
+
+
+def test_colour_cameras_of_the_same_baseline_are_not_told_apart():
+    grey = samples.kitti_benchmark(RIG)
+    assert "--baseline" in parse(grey + samples.KITTI_OBJECT).notes[0]
+    assert not parse(grey + grey.replace("P0:", "P2:").replace("P1:", "P3:")).notes

@@ -58,10 +58,11 @@ def read_kitti(file: File) -> Fields:
     first, *other = (
         _kitti_fields(file, values, size_key, *(key.format(view) for view in pair)) for pair in pairs
     )
-    if other:
+    grey, *colour = (f"{each.baseline:.5f}" for each in (first, *other))
+    if colour not in ([], [grey]):
         note = (
-            f"{file.name}: the baseline is that of the grey cameras 0 and 1, {first.baseline:.5f} m; "
-            f"for images of the colour cameras 2 and 3 give --baseline {other[0].baseline:.5f}"
+            f"{file.name}: the baseline is that of the grey cameras 0 and 1, {grey} m; "
+            f"for images of the colour cameras 2 and 3 give --baseline {colour[0]}"
         )
         first = replace(first, notes=(note,))
     return first
