@@ -159,7 +159,8 @@ class Source:
         try:
             yield
         except EstimationError as error:
-            raise EstimationError("; ".join(filter(None, [str(error), self.doubt]))) from error
+            doubts = [text for code, text in self.doubts.items() if code != "beyond"]  # of the pose alone
+            raise EstimationError("; ".join(filter(None, [str(error), *doubts]))) from error
 
     @property
     def text(self) -> str:
