@@ -48,6 +48,11 @@ def one_line(text: str) -> str:
     return " ".join(text.split())
 
 
+def counted(count: int, what: str) -> str:
+    """Return how many there are, in words."""
+    return f"{count:,} {what}" + ("" if count == 1 else "s")
+
+
 def without_secrets(text: str) -> str:
     """Leave out the passwords and the queries of web addresses, and signatures wherever they are."""
     return _SIGNATURE.sub(r"\1", _ADDRESS.sub(r"\1\2", text))

@@ -8,6 +8,7 @@ from rollcli.errors import UsageError
 from rollcli.files.naming import listed
 from rollcli.files.results import Result, Row
 from rollcli.files.stores.locations import public_name
+from rollcli.messages import counted
 from rollcli.report.charts import frame_axis, outside
 from rollcli.report.figures import with_still
 from rollcli.report.options import ReportOptions
@@ -15,7 +16,6 @@ from rollcli.report.page import Chart, render_page, script_json
 from rollcli.report.pictures import Pictures
 from rollcli.report.summary import (
     degrees,
-    frame_count,
     input_folders,
     option_lines,
     summarize,
@@ -46,7 +46,7 @@ def report_page(
         "rollcli.report",
         "report.html",
         *("page", "report", "frames"),
-        title=options.title or f"Roll of {frame_count(len(rows))}",
+        title=options.title or f"Roll of {counted(len(rows), 'frame')}",
         result=listed(map(public_name, options.results)),
         version=run.get("rollcli"),
         page_version=__version__,
@@ -70,7 +70,7 @@ def report_page(
         doubtful=doubtful,
         rows=_table(rows, rig),
         gallery=[(place + 1, rows[place], reason, pictures) for (place, reason), pictures in shown],
-        angled=frame_count(sum(row.roll_deg is not None for row in rows)),
+        angled=counted(sum(row.roll_deg is not None for row in rows), "frame"),
     )
 
 

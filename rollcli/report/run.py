@@ -10,11 +10,12 @@ from rollcli.extras import require_extra
 from rollcli.files.naming import listed, natural_key
 from rollcli.files.results import Result, Row, read_result, run_path
 from rollcli.files.storage import is_stream, write_output
+from rollcli.messages import counted
 from rollcli.report.charts import all_charts
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import Chart
 from rollcli.report.sources import Subject, choose, subjects
-from rollcli.report.summary import common_run, frame_count
+from rollcli.report.summary import common_run
 from rollcli.rig.drive.assess import RigAssessment, assess_rig
 from rollcli.run.options import EncodingOptions
 from rollcli.run.outputs import check_named_once, listed_only
@@ -127,11 +128,11 @@ def _write(
         progress.say(f"no picture of {reason}")
     if missing:
         progress.say(
-            f"{len(missing)} of {frame_count(len(pictures))} without pictures: run where estimate ran, name "
-            "what it wrote with --images, or leave pictures out with --gallery 0"
+            f"{len(missing)} of {counted(len(pictures), 'frame')} without pictures: run where estimate ran, "
+            "name what it wrote with --images, or leave pictures out with --gallery 0"
         )
     shown = len(pictures) - len(missing)
-    progress.note(f"{options.output}: pictures of {frame_count(shown)}, {len(page) / 1e6:.1f} MB")
+    progress.note(f"{options.output}: pictures of {counted(shown, 'frame')}, {len(page) / 1e6:.1f} MB")
     return ExitStatus.FRAMES_FAILED if missing else ExitStatus.DONE
 
 

@@ -88,8 +88,3 @@ def _shown(value: Any, between: str = ",") -> str:
     if isinstance(value, list):
         return between.join(map(_shown, value))
     return f"{value:.15g}" if isinstance(value, float) else str(value)
-
-
-def frame_count(count: int) -> str:
-    """Return how many frames, in words."""
-    return f"{count:,} frame" + ("" if count == 1 else "s")

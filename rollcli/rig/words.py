@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from rollcli.messages import counted
 from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
 from rollcli.rig.drive.posterior import TUNING, Estimate
 from rollcli.rig.drive.quantity import SequenceAssessment
@@ -72,8 +73,7 @@ def counts(rig: RigAssessment) -> str:
         )
         if count
     ]
-    frames = f"{rig.count:,} frame" + "s" * (rig.count != 1)
-    return ", ".join([f"{rig.used:,} of {frames}", *left_out])
+    return ", ".join([f"{rig.used:,} of {counted(rig.count, 'frame')}", *left_out])
 
 
 def now_in_words(rig: RigAssessment, quantity: Quantity = ROLL) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 
 from rollcli.errors import ExitStatus, UsageError
 from rollcli.files.naming import listed
+from rollcli.messages import counted
 from rollcli.rig.calibration import Calibration, for_matched
 from rollcli.rig.drive.assess import DriveAssessment, RigAssessment, difference
 from rollcli.rig.drive.posterior import Estimate
@@ -107,8 +108,7 @@ class Health:
     def summary(self) -> str:
         """The verdict, with how far the right view is off."""
         off = answer(self.reach, PIXELS).lstrip("+")
-        pairs = f"{self.frames:,} pair" + "s" * (self.frames != 1)
-        return f"{self.verdict}: up to {off} off in the image ({pairs})"
+        return f"{self.verdict}: up to {off} off in the image ({counted(self.frames, 'pair')})"
 
     @property
     def effect(self) -> str:
