@@ -159,14 +159,17 @@ class Source:
         try:
             yield
         except EstimationError as error:
-            doubts = [text for code, text in self.doubts.items() if code != "beyond"]  # of the pose alone
-            raise EstimationError("; ".join(filter(None, [str(error), *doubts]))) from error
+            raise EstimationError("; ".join([str(error), *self._doubts_of_map])) from error
+
+    @property
+    def _doubts_of_map(self) -> list[str]:
+        """All but that numbers are too large to be pixels: that is of the pose, and seen by all readers."""
+        return [text for code, text in self.doubts.items() if text and code != "beyond"]
 
     @property
     def text(self) -> str:
         """What a file of the map carries, one line of ASCII (see `_carried`); empty where that is nothing."""
-        # that numbers are too large to be pixels, whoever reads the file sees
-        doubt = "; ".join(text for code, text in self.doubts.items() if text and code != "beyond")
+        doubt = "; ".join(self._doubts_of_map)
         if not (self.slope_error or doubt or self.alignment):
             return ""
         carried = {"slope_error": self.slope_error, "doubt": doubt, "alignment": self.alignment}
