@@ -283,18 +283,15 @@ class Search:
             if is_archive(base_name(url)):
                 require_local(url, "archives are read from local disk: download it first")
             return self._named(url, base_name(url))
-        if f"{url.rstrip('/')}/" in self._skipped_urls:
+        folder = f"{url.rstrip('/')}/"
+        if folder in self._skipped_urls:
             raise UsageError(f"{url}: {_BOTH}")
-        readable = (
-            (each, below)
-            for each, below in objects_behind(url, recursive=self.recursive)
-            if self._reads(each) and not below.startswith(self._skipped_below(each.removesuffix(below)))
-        )
+        # an output above what is searched hides none of it
+        skipped = tuple(each for each in self._skipped_urls if not folder.startswith(each))
+        found = objects_behind(url, recursive=self.recursive)
+        wanted = (each for each in found if not each[0].startswith(skipped))
+        readable = ((each, below) for each, below in wanted if self._reads(each))
         return self._wanted(url, readable, "pattern" if pattern else "folder")
-
-    def _skipped_below(self, base: str) -> tuple[str, ...]:
-        skipped = (each for each in self._skipped_urls if each.startswith(base) and each != base)
-        return tuple(each.removeprefix(base) for each in skipped)
 
     def _reads(self, name: str) -> bool:
         return name.lower().endswith(self.endings)

@@ -253,10 +253,7 @@ _CALL = (
 )
 
 
-_ABOUT = {
-    True: "the principal point",
-    False: "the middle of the image: --calib makes that the principal point, or all disparities are off",
-}
+_MIDDLE = "the middle of the image: --calib makes that the principal point, or all disparities are off"
 NO_COLUMNS = "too few pairs of one size can be read here: each tells alone what of a scale is in the columns"
 
 
@@ -271,7 +268,9 @@ def correction_text(health: Health | None, rows: DriveRows | None, results: Sequ
     if health is None:
         raise UsageError(f"{results[0]}: no pair was measured, so there is no correction to write")
     width, height = health.size
-    axis = (0.0, 0.0) if health.calibration is None else health.calibration.right_axis(width, height)
+    axis, about = (0.0, 0.0), _MIDDLE
+    if health.calibration is not None:
+        axis, about = health.calibration.right_axis(width, height), "the principal point"
     larger = None if rows is None else rows.columns.scale
     values = {
         **alignment_values(health),
@@ -281,6 +280,6 @@ def correction_text(health: Health | None, rows: DriveRows | None, results: Sequ
         "matrix": health.misalignment.matrix(height, width, larger, axis),
         "opencv": _CALL,
         "note": "matrix: from a pixel of the corrected right view to the given one, without twist and bend, "
-        f"which no matrix holds, about {_ABOUT[health.calibration is not None]}; {NOT_SEEN}",
+        f"which no matrix holds, about {about}; {NOT_SEEN}",
     }
     return json.dumps(values, indent=2) + "\n"
