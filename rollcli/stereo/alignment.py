@@ -214,22 +214,22 @@ class _Blocks:
 
     def __init__(self, texture: Texture, disparity: Floats, every: int = 1) -> None:
         self._right, self._shape = texture.right, texture.left.shape
-        known = cv2.threshold(disparity, 0, 1, cv2.THRESH_BINARY)[1].astype(np.float32, copy=False)
-        row, column = (np.arange(side // BLOCK) for side in known.shape)
-        looked_at = (row[:, None] + 2 * column) % every == 0
-        self.count = int(np.count_nonzero(looked_at))
-        places = looked_at & (block_means(known) > _KNOWN)
-        down = blocks_at(texture.down, places)
+        row, column = (np.arange(side // BLOCK) for side in disparity.shape)
+        places = (row[:, None] + 2 * column) % every == 0
+        self.count = int(np.count_nonzero(places))
+        far = blocks_at(disparity, places)
+        known = np.count_nonzero(far > 0, axis=1) > _KNOWN * BLOCK**2
+        places[places] = known
+        far, down = far[known], blocks_at(texture.down, places)
         varies = np.einsum("ij,ij->i", down, down) / BLOCK**2 - np.square(down.mean(axis=1))
         # of a block's squares no more is left than all of them, over a count of `_KNOWN` of it or more
-        places[places] = varies > np.float32(_LEAST * _KNOWN * _ROUNDING)
-
-        self._left, self._seen = blocks_at(texture.left, places), blocks_at(known, places)
-        self._across, self._down = blocks_at(texture.across, places), blocks_at(texture.down, places)
+        telling = varies > np.float32(_LEAST * _KNOWN * _ROUNDING)
+        places[places] = telling
+        far, self._down, self._seen = far[telling], down[telling], (far[telling] > 0).astype(np.float32)
+        self._left, self._across = blocks_at(texture.left, places), blocks_at(texture.across, places)
         rows, columns = (BLOCK * place[:, None].astype(np.float32) for place in np.nonzero(places))
         within = np.arange(BLOCK, dtype=np.float32)
         self._v = rows + np.repeat(within, BLOCK)
-        far = blocks_at(disparity, places)
         self._u = columns + np.tile(within, BLOCK) - far
         self._near = far.sum(axis=1) / np.maximum(self._seen.sum(axis=1), np.float32(1))
         self._centre_x, centre_y = (np.float32((side - 1) / 2) for side in reversed(disparity.shape))

@@ -80,8 +80,14 @@ class Misalignment:
 
         `near` are their disparities, pixels.
         """
-        slope = self.scale + self.twist * x + self.curve * y
-        return self.offset + self.rotation * x + slope * y + self.tilt * near
+        straight = self.offset + (self.scale + self.curve * y) * y
+        if self.tilt:  # rarely, and `near` may be a whole map
+            straight = straight + self.tilt * near
+        return straight + (self.rotation + self.twist * y) * x
+
+    def slopes(self, x: Any, y: Any) -> tuple[Any, Any]:
+        """Return how `down` changes at points (x, y) from the centre, along the rows and down the columns."""
+        return self.rotation + self.twist * y, self.scale + self.twist * x + 2 * self.curve * y
 
     def shifts(self, height: int, width: int) -> tuple[float, float, float, float, float, float]:
         """Return the largest vertical shift of each part in a view of this size, pixels; signed."""

@@ -121,16 +121,18 @@ def _found(
     middle, across, down = (each[rows][told] for each in (planes.middle, planes.across, planes.down))
     row, column = (BLOCK * place.astype(np.float32) - _OFF_MIDDLE[0] for place in np.nonzero(told))
     row += np.float32(pixels.start)
-    none = np.zeros_like(row)
-    u = np.stack([column - middle, 1 - across, -down], axis=1) @ _PLANE
-    v = np.stack([row, none, none + 1], axis=1) @ _PLANE
-    u, v = seen_at(lies, u, v, right.shape, middle[:, None])
+    u, v = seen_at(lies, column - middle, row, right.shape, middle)
+    x, y = column - middle - np.float32((right.shape[1] - 1) / 2), row - np.float32((right.shape[0] - 1) / 2)
+    along, below = lies.slopes(x, y)  # within a block, what bends the rows is straight
+    wider = 1 + lies.scale
+    u = np.stack([u, wider * (1 - across), -wider * down - lies.rotation], axis=1) @ _PLANE
+    v = np.stack([v, along * (1 - across), 1 + below - along * down], axis=1) @ _PLANE
     grey = blocks_at(left[pixels], told).astype(np.float32)
     weight = blocks_at(gradient[pixels], told)
     weight -= weight.mean(axis=1, keepdims=True)  # one view may be brighter than the other
     weight /= (np.einsum("ij,ij->i", weight, weight) + np.float32(_RIDGE * BLOCK**2))[:, None]
     weight *= (1 - across)[:, None]  # the right view is that much less stretched than the left one
-    shift: Floats = none
+    shift: Floats = np.zeros_like(row)
     for between in _ROUNDS if lies == LEVEL else _ROUNDS_LEVELLED:
         off = sampled(right, u, v, between) - grey
         step = np.clip(np.einsum("ij,ij->i", weight, off), -_LONGEST_STEP, _LONGEST_STEP)

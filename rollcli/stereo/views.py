@@ -251,8 +251,9 @@ def seen_at(
     if lies == LEVEL:
         return u, v
     height, width = shape
-    x, y = u - np.float32((width - 1) / 2), v - np.float32((height - 1) / 2)
-    return u + lies.scale * x - lies.rotation * y, v + lies.down(x, y, near)
+    middle = np.float32((width - 1) / 2)
+    x, y = u - middle, v - np.float32((height - 1) / 2)
+    return (1 + lies.scale) * x + (middle - lies.rotation * y), v + lies.down(x, y, near)
 
 
 def block_means(pixels: NDArray[np.float32]) -> NDArray[np.float32]:
