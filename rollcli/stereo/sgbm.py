@@ -25,7 +25,7 @@ def without_lag(disparity: NDArray[np.float32], mode: str) -> NDArray[np.float32
     disparity : ndarray of float32, shape (H, W)
         As SGBM finds it, px; no data is <= 0 and stays.
     mode : str
-        One of `stereo_options.MODES`.
+        One of `options.MODES`.
 
     Returns
     -------
