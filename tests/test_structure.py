@@ -21,7 +21,7 @@ LAYERS = (
 DOORS = {
     "rollcli": "names load when they are first used, so that `import rollcli` costs nothing",
     "rollcli.__main__": "a worker process imports it anew, and a signal during imports is one line",
-    "rollcli.evaluate.paper": "loads the experiments, NumPy and the charts once the request is checked",
+    "rollcli.evaluate.paper": "loads the page and its charts, an extra, once there is something to draw",
     "rollcli.files.containers": "loads the reader of bags, an extra, and NumPy only for bags",
     "rollcli.run.find": "loads the reader of bags, an extra, only for them, and NumPy for an image's size",
     "rollcli.files.storage": "urllib loads only for URLs of web servers",

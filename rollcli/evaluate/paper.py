@@ -3,25 +3,26 @@
 import contextlib
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
+from rollcli import __version__
 from rollcli.errors import ExitStatus, UsageError
+from rollcli.evaluate.experiments import Findings, Times, examine_file, lost, time_solvers, usable_pixels
 from rollcli.evaluate.options import PaperOptions
+from rollcli.evaluate.paper_tables import DELTAS_DEG, METHOD_NAMES, SOLVER_NAMES, all_tables, table_csv
 from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.extras import require_extra
 from rollcli.files.inputs import stem_of
+from rollcli.files.results import Row
 from rollcli.files.storage import write_output
 from rollcli.files.stores.locations import within
 from rollcli.run.find import find_frames
 from rollcli.run.frame import Frame
 from rollcli.run.outputs import check_places, listed_only
 from rollcli.run.progress import Progress
+from rollcli.run.read import read_source
 from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import stop_on_signals
 from rollcli.run.workers.tasks import run_tasks
-
-if TYPE_CHECKING:
-    from rollcli.evaluate.experiments import Findings, Times
 
 PAGE = "paper.html"
 FIGURES = ("table1_iterations", "table2_runtime", "fig3_lambda0", "fig6_accuracy", "methods_accuracy")
@@ -73,12 +74,10 @@ def _known_angles(frames: Sequence[Frame], options: PaperOptions) -> Mapping[str
 
 
 def _run(frames: Sequence[Frame], truth: Mapping[str, KnownPose], options: PaperOptions) -> ExitStatus:
-    from rollcli.evaluate.experiments import examine_file, lost
-
     work = Work(partial(examine_file, options=options, truth=truth), lost)
     progress = Progress(len(frames), options.running, options.encoding, statuses=("ok",))
     found: list[Findings] = []
-    failed: list[tuple[str, str]] = []
+    failed: list[Row] = []
     with (
         stop_on_signals() as stop,
         progress,
@@ -87,7 +86,7 @@ def _run(frames: Sequence[Frame], truth: Mapping[str, KnownPose], options: Paper
         for result, findings in all_examined:
             progress.add(result)
             if findings is None:
-                failed.append((result.row.file, result.row.message))
+                failed.append(result.row)
             else:
                 found.append(findings)
     if stop.asked:
@@ -97,39 +96,59 @@ def _run(frames: Sequence[Frame], truth: Mapping[str, KnownPose], options: Paper
     if not found:
         progress.say("no map gave an angle: there is nothing to tabulate")
         return progress.summary.status
-    times = _time(frames, found, options, progress)
-    _write(found, failed, times, options)
+    good = {findings.file for findings in found}
+    chosen = [frame for frame in frames if frame.file in good][: options.experiments.timed]
+    progress.note(f"run times, on {len(chosen)} of the maps")
+    # in this process alone
+    times = [time_solvers(usable_pixels(read_source(frame, options.frame))) for frame in chosen]
+    for name, data in paper_files(found, failed, times, options).items():
+        write_output(within(options.experiments.output, name), data, overwrite=options.running.overwrite)
     progress.note(f"{within(options.experiments.output, PAGE)} and {len(TABLES)} tables are written")
     return progress.summary.status
 
 
-def _time(
-    frames: Sequence[Frame], found: "list[Findings]", options: PaperOptions, progress: Progress
-) -> "list[Times]":
-    """Take the run times on the first maps, in this process alone."""
-    from rollcli.evaluate.experiments import time_solvers, usable_pixels
-    from rollcli.run.read import read_source
+def paper_files(
+    found: Sequence[Findings], failed: Sequence[Row], times: Sequence[Times], options: PaperOptions
+) -> dict[str, bytes]:
+    """Make the tables, the page and what else was asked for, by the names of their files.
 
-    good = {findings.file for findings in found}
-    chosen = [frame for frame in frames if frame.file in good][: options.experiments.timed]
-    progress.note(f"run times, on {len(chosen)} of the maps")
-    return [time_solvers(usable_pixels(read_source(frame, options.frame))) for frame in chosen]
-
-
-def _write(
-    found: "list[Findings]", failed: list[tuple[str, str]], times: "list[Times]", options: PaperOptions
-) -> None:
+    Parameters
+    ----------
+    found : sequence of Findings
+        Of each map.
+    failed : sequence of Row
+        Of maps without findings; they say why.
+    times : sequence of Times
+        Of some maps.
+    options : PaperOptions
+    """
     from rollcli.evaluate.paper_figures import paper_figures
-    from rollcli.evaluate.paper_page import all_tables, paper_page, table_csv
     from rollcli.pictures.figures import PRINT
     from rollcli.report.figures import chart_file
+    from rollcli.report.page import render_page
 
     tables = all_tables(found, failed, times)
     figures = paper_figures(tables)
-    page = paper_page(tables, figures, found, failed, times, options)
-    written = {f"{name}.csv": table_csv(tables[name]) for name in TABLES} | {PAGE: page}
-    if (kind := options.experiments.figure) is not None:
-        for name, figure in figures.items():
-            written[f"{name}.{kind}"] = chart_file(figure, kind, PRINT)
-    for name, data in written.items():
-        write_output(within(options.experiments.output, name), data, overwrite=options.running.overwrite)
+    page = render_page(
+        "rollcli.evaluate",
+        PAGE,
+        title=f"The paper's experiments on {len(found)} map{'' if len(found) == 1 else 's'}",
+        version=__version__,
+        deltas=DELTAS_DEG,
+        solvers=SOLVER_NAMES,
+        methods=METHOD_NAMES,
+        tables=tables,
+        charts=figures,
+        found=found,
+        failed=failed,
+        times=times,
+        options=options.experiments,
+        region=options.has_region,
+    )
+    kind = options.experiments.figure
+    printed = {} if kind is None else figures
+    return {
+        **{f"{name}.csv": table_csv(table) for name, table in tables.items()},
+        PAGE: page,
+        **{f"{name}.{kind}": chart_file(figure, str(kind), PRINT) for name, figure in printed.items()},
+    }

@@ -11,7 +11,7 @@ from matplotlib.ticker import EngFormatter, Formatter, NullLocator, StrMethodFor
 from numpy.typing import NDArray
 
 from rollcli.estimator.request import LAMBDA0
-from rollcli.evaluate.paper_page import DELTAS_DEG, METHOD_NAMES, SOLVER_NAMES, Table, Value, column
+from rollcli.evaluate.paper_tables import DELTAS_DEG, METHOD_NAMES, SOLVER_NAMES, Table, Value, column
 from rollcli.report.figures import Drawing, colour
 
 _COLOURS = {"gd": "c1", "gss": "c2", "exact": "c3"}

@@ -14,7 +14,7 @@ from rollcli.simulate.road import Carriageway, Piece, Site, cross_section, draw_
 from rollcli.simulate.scene import FAR, Light, Scene, draw, draw_light, draw_offset
 from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Ground, Surface
-from rollcli.simulate.views import Camera, bands, expose, first_hits, render_view
+from rollcli.simulate.views import Camera, View, expose, render_view
 
 _HORIZON = 2000.0  # metres: the end of a bare world
 # of dips and bumps
@@ -166,29 +166,27 @@ def _dipped(surface: Surface, dips: Sequence[Dip]) -> Surface:
     return replace(surface, relief=replace(surface.relief or LEVEL, dips=mine)) if mine else surface
 
 
-def true_heights(scene: Scene, spec: FrameSpec, carriageway: Carriageway, camera: Camera) -> Values:
-    """Return how high the ground that a camera sees lies over the road, metres, (H, W); NaN for the rest.
+def true_heights(scene: Scene, spec: FrameSpec, camera: Camera, view: View) -> Values:
+    """Return how high the ground in a camera's view lies over the road, metres, (H, W); NaN for the rest.
 
     The road is the carriageway without dips, bumps and gutters, which goes on beyond its edges as it is at
     them.
     """
+    carriageway = carriageway_of(spec)
     section = cross_section(
         spec.cross_section, spec.crossfall, 0.0, carriageway.left, carriageway.right, carriageway.course.bend
     )
-    ground = np.array([isinstance(each, Ground) for each in scene.surfaces] + [False])
-    course, heights = carriageway.course, np.full((camera.height, camera.width), np.nan, np.float32)
-    for rows in bands(camera):
-        rays = camera.rays_of(rows)
-        depth, owner = first_hits(scene, rays)
-        seen = ground[owner]
-        points = rays.origin + depth[seen] * rays.direction[:, seen]
-        lateral = course.lateral(points)
-        piece = section.piece(lateral)
-        normal = -piece.slope_at(lateral) * course.across(points[2])
-        normal[1] += 1.0
-        normal[2] -= course.curvature * points[2]
-        over = course.elevation(points) - piece.elevation(lateral)
-        heights[rows.start : rows.stop].reshape(-1)[seen] = over / np.linalg.norm(normal, axis=0)
+    seen = np.array([isinstance(each, Ground) for each in scene.surfaces] + [False])[view.surface]
+    v, u = np.nonzero(seen)
+    rays, course = camera.rays(u, v), carriageway.course
+    points = rays.origin + view.depth[seen] * rays.direction
+    lateral = course.lateral(points)
+    piece = section.piece(lateral)
+    normal = -piece.slope_at(lateral) * course.across(points[2])
+    normal[1] += 1.0
+    normal[2] -= course.curvature * points[2]
+    heights = np.full(seen.shape, np.nan, np.float32)
+    heights[seen] = (course.elevation(points) - piece.elevation(lateral)) / np.linalg.norm(normal, axis=0)
     return heights
 
 
@@ -229,7 +227,5 @@ def render_frame(spec: FrameSpec) -> RenderedFrame:
         for view, gain in zip(views, (1.0, spec.gain), strict=True)
     )
     disparity = (spec.focal * spec.baseline / views[0].depth).astype(np.float32)
-    heights = None
-    if spec.dips is not None:
-        heights = true_heights(scene, spec, carriageway_of(spec), cameras[0])
+    heights = None if spec.dips is None else true_heights(scene, spec, cameras[0], views[0])
     return RenderedFrame(left, right, disparity, views[0].material == scene.road, spec, heights)

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rollcli.estimator.moments import strips
 from rollcli.simulate.materials import Material, Values
 from rollcli.simulate.scene import OVERCAST, Scene, air_below, in_shadow, sky
 from rollcli.simulate.surfaces import Ground, Indices, Surface, SurfaceSample, Wall
@@ -266,26 +267,21 @@ _SUBPIXELS = np.array([[-0.375, -0.125], [0.125, -0.375], [0.375, 0.125], [-0.12
 
 
 class View(NamedTuple):
-    """A camera's image: depth (H, W) in metres, inf in the sky; material (H, W); light (H, W, 3)."""
+    """A camera's image: depth in metres, inf in the sky; surface, material, all (H, W); light (H, W, 3)."""
 
     depth: Array
+    surface: NDArray[np.int16]
     material: NDArray[np.int16]
     light: Values
 
 
 def render_view(scene: Scene, camera: Camera) -> View:
     """Render the image of a camera; pixels at edges are the mean of four rays."""
-    found = [_render_band(scene, camera, rows) for rows in bands(camera)]
+    found = [_render_band(scene, camera, rows) for rows in strips(camera.height, _BAND // camera.width)]
     return View(*map(np.concatenate, zip(*found, strict=True)))
 
 
-def bands(camera: Camera) -> list[range]:
-    """Return the rows of an image in parts of `_BAND` pixels."""
-    step = max(1, _BAND // camera.width)
-    return [range(top, min(top + step, camera.height)) for top in range(0, camera.height, step)]
-
-
-def _render_band(scene: Scene, camera: Camera, rows: range) -> View:
+def _render_band(scene: Scene, camera: Camera, rows: slice) -> View:
     """Render these rows of a camera's image."""
     # one more row above and below: an edge is where a pixel differs from its neighbour
     around = range(max(rows.start - 1, 0), min(rows.stop + 1, camera.height))
@@ -306,6 +302,7 @@ def _render_band(scene: Scene, camera: Camera, rows: range) -> View:
     shape, inner = (len(around), camera.width), slice(rows.start - around.start, rows.stop - around.start)
     return View(
         hits.depth.reshape(shape)[inner],
+        hits.surface.reshape(shape)[inner],
         hits.material.reshape(shape)[inner],
         light[: len(rays.u)].reshape(*shape, 3)[inner],
     )

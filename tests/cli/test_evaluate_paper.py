@@ -6,7 +6,7 @@ import shutil
 import numpy as np
 import pytest
 
-from rollcli.evaluate import experiments as job
+from rollcli.evaluate import paper as job
 from rollcli.evaluate.paper import PAGE, TABLES
 from rollcli.run.workers import tasks as run_tasks
 from tests.estimator.synthetic_maps import bent_road

@@ -19,7 +19,7 @@ from rollcli.evaluate.experiments import (
     rotate_nearest,
     time_solvers,
 )
-from rollcli.evaluate.paper_page import DELTAS_DEG, all_tables, column
+from rollcli.evaluate.paper_tables import DELTAS_DEG, all_tables, column
 from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of
 
 TURNS = [math.radians(turn) for turn in (-10, 0, 15)]

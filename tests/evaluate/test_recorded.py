@@ -27,7 +27,8 @@ from rollcli.evaluate.experiments import (
     rotate_nearest,
 )
 from rollcli.evaluate.options import ExperimentOptions, PaperOptions
-from rollcli.evaluate.paper_page import all_tables, paper_page, table_csv
+from rollcli.evaluate.paper import PAGE, paper_files
+from rollcli.evaluate.paper_tables import all_tables, table_csv
 from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.files.results import Row
 from rollcli.run.options import InputOptions, RegionOptions, RunningOptions
@@ -56,7 +57,9 @@ def _tables():
         for at, solver in enumerate(("gss", "gd"))
         for more, form in enumerate(FORMS)
     }
-    return all_tables(_found(), [("bad.png", "no pixel")], [Times(900, seconds), Times(700, seconds)])
+    return all_tables(
+        _found(), [Row("bad.png", message="no pixel")], [Times(900, seconds), Times(700, seconds)]
+    )
 
 
 def _textbook():
@@ -142,8 +145,7 @@ def _page(count=1, seconds=(1.0,), region=None, **experiments):
         experiments=ExperimentOptions("out", **experiments),
         running=RunningOptions(),
     )
-    tables = all_tables(found, [], timed)
-    page = paper_page(tables, _figures(tables), found, [], timed, options).decode()
+    page = paper_files(found, [], timed, options)[PAGE].decode()
     page = page.replace(f"rollcli {__version__}", "rollcli")
     shown = re.sub(r"<(script|style|svg).*?</\1>", "", page, flags=re.S)
     return " ".join(html.unescape(re.sub("<[^>]+>", "", shown)).split())

@@ -1,20 +1,14 @@
-"""The paper's tables and figures as tables of numbers, each one CSV, and the page that shows them."""
+"""The paper's tables and figures as tables of numbers, each one CSV."""
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from rollcli import __version__
 from rollcli.estimator.request import SOLVERS
 from rollcli.evaluate.experiments import DELTAS, FORMS, LAMBDAS, METHODS, Findings, Times
-from rollcli.evaluate.options import PaperOptions
-from rollcli.files.results import csv_table
-from rollcli.report.page import render_page
-
-if TYPE_CHECKING:
-    from rollcli.report.figures import Drawing
+from rollcli.files.results import Row, csv_table
 
 Value = str | int | float | None
 Line = dict[str, Value]
@@ -52,7 +46,7 @@ def column(table: Table, name: str, **of: Value) -> list[Any]:
     return [row[name] for row in table if of.items() <= row.items()]
 
 
-def maps_table(found: Sequence[Findings], failed: Sequence[tuple[str, str]]) -> Table:
+def maps_table(found: Sequence[Findings], failed: Sequence[Row]) -> Table:
     """Return each map: its angle, and the iterations on it; of one that failed the reason."""
     table = Table()
     for each in found:
@@ -63,7 +57,7 @@ def maps_table(found: Sequence[Findings], failed: Sequence[tuple[str, str]]) -> 
             row |= zip((f"{name}_{delta:g}" for delta in DELTAS_DEG), getattr(each, solver), strict=True)
         table.append({**row, "message": ""})
     nothing = dict.fromkeys(table[0])
-    return table + [{**nothing, "file": name, "message": reason} for name, reason in failed]
+    return table + [{**nothing, "file": row.file, "message": row.message} for row in failed]
 
 
 def iterations_table(found: Sequence[Findings]) -> Table:
@@ -141,9 +135,7 @@ def _errors(errors: Sequence[float]) -> Line:
     return {**dict(zip(names, map(float, figures), strict=True)), "estimates": len(errors)}
 
 
-def all_tables(
-    found: Sequence[Findings], failed: Sequence[tuple[str, str]], times: Sequence[Times]
-) -> dict[str, Table]:
+def all_tables(found: Sequence[Findings], failed: Sequence[Row], times: Sequence[Times]) -> dict[str, Table]:
     """Return every table by the name of its file, without the ending."""
     return {
         "maps": maps_table(found, failed),
@@ -153,30 +145,3 @@ def all_tables(
         "fig6_accuracy": solvers_table(found),
         "methods_accuracy": methods_table(found),
     }
-
-
-def paper_page(
-    tables: Mapping[str, Table],
-    charts: "Mapping[str, Drawing]",
-    found: Sequence[Findings],
-    failed: Sequence[tuple[str, str]],
-    times: Sequence[Times],
-    options: PaperOptions,
-) -> bytes:
-    """Return the page, HTML."""
-    return render_page(
-        "rollcli.evaluate",
-        "paper.html",
-        title=f"The paper's experiments on {len(found)} map{'' if len(found) == 1 else 's'}",
-        version=__version__,
-        deltas=DELTAS_DEG,
-        solvers={solver: SOLVER_NAMES[solver] for solver in PAPER_ITERATIONS},
-        methods=METHOD_NAMES,
-        tables=tables,
-        charts=charts,
-        found=found,
-        failed=failed,
-        times=times,
-        options=options.experiments,
-        region=options.has_region,
-    )
