@@ -15,8 +15,14 @@ _SIDE = 512  # texels of a tile, a power of two: wrapping is a bit mask
 class NoiseTile:
     """Periodic noise of unit variance as a pyramid of averages: texels of level k are 2^k times as large."""
 
-    def __init__(self, seed: int, slope: float, longest: float) -> None:
-        """Make noise with amplitudes of frequency^-slope, without waves longer than `longest` texels."""
+    def __init__(self, seed: int, slope: float, longest: float, texel: float) -> None:
+        """Make noise with amplitudes of frequency^-slope, without waves longer than `longest` texels.
+
+        Parameters
+        ----------
+        texel : float
+            The side of a texel of level 0, metres.
+        """
         rng = np.random.default_rng(seed)
         fy, fx = np.fft.fftfreq(_SIDE)[:, None], np.fft.rfftfreq(_SIDE)[None]
         frequency = np.hypot(fy, fx)
@@ -30,19 +36,21 @@ class NoiseTile:
         while level.shape[0] >= 2:
             levels.append(level.astype(np.float32).ravel())
             level = level.reshape(level.shape[0] // 2, 2, -1, 2).mean(axis=(1, 3))
-        self._table = np.concatenate(levels)
+        self._table, self._texel = np.concatenate(levels), texel
         sides = _SIDE >> np.arange(len(levels))
         self._starts = np.concatenate([[0], np.cumsum(sides**2)[:-1]]).astype(np.int32)
         self._bits = np.log2(sides).astype(np.int32)
         self._scales = (sides / _SIDE).astype(np.float32)
         self._masks = (sides - 1).astype(np.int32)
 
-    def sample(self, x: Values, y: Values, level: NDArray[np.int32]) -> Values:
-        """Return the noise at (x, y), texels of level 0, averaged over 2^level texels; bilinear."""
+    def sample(self, x: Values, y: Values, w: Values) -> Values:
+        """Return the noise at (x, y) metres averaged over about `w` metres; bilinear."""
+        # rint(log2(w / texel)) from the exponent bits of a float32, which is several times faster
+        level = ((w * np.float32(np.sqrt(2) / self._texel)).view(np.int32) >> 23) - np.int32(127)
         level = np.minimum(np.maximum(level, 0), len(self._starts) - 1)
         start, bits, mask = (table[level] for table in (self._starts, self._bits, self._masks))
         scale = self._scales[level]
-        x, y = x * scale - np.float32(0.5), y * scale - np.float32(0.5)
+        x, y = (each * np.float32(1 / self._texel) * scale - np.float32(0.5) for each in (x, y))
         floor_x, floor_y = np.floor(x), np.floor(y)
         wx, wy = x - floor_x, y - floor_y
         column, row = floor_x.astype(np.int32) & mask, floor_y.astype(np.int32) & mask
@@ -60,30 +68,20 @@ class NoiseTile:
 @lru_cache(maxsize=1)
 def _tiles() -> tuple[NoiseTile, NoiseTile]:
     # no long waves in the fine tile: its period would be visible; the coarse tile has them
-    return NoiseTile(1, 0.75, 80.0), NoiseTile(2, 1.1, float(_SIDE))
-
-
-FINE_TEXEL, COARSE_TEXEL = 0.006, 0.1  # metres
+    return NoiseTile(1, 0.75, 80.0, 0.006), NoiseTile(2, 1.1, float(_SIDE), 0.1)
 
 
 def fine(p: Values, q: Values, w: Values, offset: float = 0.0) -> Values:
     """Return grain from 1 cm to half a metre, of unit variance, at (p, q) metres averaged over `w` metres."""
     # rotated against the road, so that no row of texels runs along it
     x, y = 0.946 * p + 0.324 * q, 0.946 * q - 0.324 * p
-    return _sample(_tiles()[0], x + np.float32(offset), y, w, FINE_TEXEL)
+    return _tiles()[0].sample(x + np.float32(offset), y, w)
 
 
 def coarse(p: Values, q: Values, w: Values, offset: float = 0.0) -> Values:
     """Return patches from 20 cm to 50 m, of unit variance, at (p, q) metres averaged over `w` metres."""
     x, y = 0.79 * p - 0.613 * q, 0.79 * q + 0.613 * p
-    return _sample(_tiles()[1], x + np.float32(offset), y, w, COARSE_TEXEL)
-
-
-def _sample(tile: NoiseTile, x: Values, y: Values, w: Values, texel: float) -> Values:
-    # rint(log2(w / texel)) from the exponent bits of a float32, which is several times faster
-    level = ((w * np.float32(np.sqrt(2) / texel)).view(np.int32) >> 23) - np.int32(127)
-    scale = np.float32(1 / texel)
-    return tile.sample(x * scale, y * scale, level)
+    return _tiles()[1].sample(x + np.float32(offset), y, w)
 
 
 def band(x: Values, low: float | Values, high: float | Values, w: Values) -> Values:

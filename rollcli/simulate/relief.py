@@ -10,12 +10,15 @@ G(n0) (n / n0)^-2 over the waves' number per metre n, G(n0) four times as large 
 import itertools
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.simulate.options import ROUGHNESS
-from rollcli.simulate.vectors import Array, Vectors
+
+Array = NDArray[np.float64]
+Vectors = NDArray[Any]
 
 # of the lane, as a lidar sees it
 HALF_WIDTHS = (0.8, 1.2, 1.6)  # metres to each side of the left camera's path
@@ -29,8 +32,8 @@ _AROUND = 1.2  # radii: a dip ends at the first
 _REFERENCE = 0.1  # waves per metre: n0 of [ISO]
 _SMOOTHEST = 16e-6  # m^3: G(n0) of class A, the geometric mean of its bounds
 _WAVES = 0.011, 2.83  # waves per metre: the range of [ISO]
-_STEP = 0.125  # metres: 2.8 nodes for the shortest wave
-_LEFT, _START = -32.0, -8.0  # metres
+STEP = 0.125  # metres: 2.8 nodes for the shortest wave
+LEFT, _START = -32.0, -8.0  # metres: where the first column and the first row are
 _ACROSS, _ALONG = 512, 2048  # nodes: 64 by 256 metres
 _SUNKEN = 0.003  # metres: the deepest track, and the highest patch, of class A
 _TRACK = 0.22  # metres: standard deviation of a track's depth across
@@ -70,19 +73,12 @@ class Relief:
     Attributes
     ----------
     heights : numpy.ndarray
-        (rows along, columns across), metres; beyond its edges the ground goes on level.
-    left, start : float
-        Lateral position of the first column and Z of the first row, metres.
-    step : float
-        Distance of the nodes, metres.
+        (rows along, columns across), metres, `STEP` apart; beyond its edges the ground goes on level.
     dips : tuple of Dip
         What lies lower or higher than that.
     """
 
     heights: Array
-    left: float
-    start: float
-    step: float
     dips: tuple[Dip, ...] = ()
 
     @property
@@ -113,8 +109,8 @@ class Relief:
     def slopes(self, lateral: Vectors, z: Vectors) -> tuple[Vectors, Vectors]:
         """Return the slopes (N,) to the right and ahead at positions (N,), metres per metre."""
         (near, right_near), (far, right_far), across, along = self._corners(lateral, z)
-        right = ((right_near - near) * (1 - along) + (right_far - far) * along) / self.step
-        ahead = ((far - near) * (1 - across) + (right_far - right_near) * across) / self.step
+        right = ((right_near - near) * (1 - along) + (right_far - far) * along) / STEP
+        ahead = ((far - near) * (1 - across) + (right_far - right_near) * across) / STEP
         for dip in self.dips:
             _, by_lateral, by_z = dip.relief(lateral, z)
             right, ahead = right + by_lateral, ahead + by_z
@@ -125,8 +121,8 @@ class Relief:
     ) -> tuple[tuple[Vectors, Vectors], tuple[Vectors, Vectors], Vectors, Vectors]:
         """Return the heights around positions, near and far, left and right, and where these lie between."""
         rows, columns = self.heights.shape
-        across = np.clip((lateral - self.left) / self.step, 0, columns - 1.001)
-        along = np.clip((z - self.start) / self.step, 0, rows - 1.001)
+        across = np.clip((lateral - LEFT) / STEP, 0, columns - 1.001)
+        along = np.clip((z - _START) / STEP, 0, rows - 1.001)
         column, row = across.astype(np.intp), along.astype(np.intp)
         node, flat = row * columns + column, self.heights.ravel()
         near = flat.take(node), flat.take(node + 1)
@@ -134,7 +130,7 @@ class Relief:
         return near, far, across - column, along - row
 
 
-LEVEL = Relief(np.zeros((2, 2)), 0.0, 0.0, 1.0)
+LEVEL = Relief(np.zeros((2, 2)))
 
 
 def lane_points() -> tuple[Array, Array, Array]:
@@ -212,7 +208,7 @@ def draw_relief(
         At a height of 0 below the rig, on the plane that fits the lane ahead (`lane_plane`).
     """
     scale = 2.0 ** ROUGHNESS.index(roughness)  # of heights, whose squares are four times as large
-    lateral, z = _LEFT + _STEP * np.arange(_ACROSS), _START + _STEP * np.arange(_ALONG)
+    lateral, z = LEFT + STEP * np.arange(_ACROSS), _START + STEP * np.arange(_ALONG)
     heights = scale * _random_field(rng)
     for wheel in wheels:
         depth = rng.uniform(0, scale * _SUNKEN)
@@ -222,17 +218,17 @@ def draw_relief(
         wide, long, raised = rng.uniform(0.5, 2.0), rng.uniform(0.8, 6.0), rng.uniform(-1, 1)
         across = (lateral >= x) & (lateral < min(x + wide, edges[1]))
         heights[np.ix_((z >= ahead) & (z < ahead + long), across)] += scale * _SUNKEN * raised
-    relief = Relief(heights, _LEFT, _START, _STEP)
+    relief = Relief(heights)
     heights -= lane_plane(relief)[0]
     return relief
 
 
 def _random_field(rng: np.random.Generator) -> Array:
     """Draw heights (rows, columns) of class A, whose profiles have the same density in all directions."""
-    along, across = np.fft.fftfreq(_ALONG, _STEP)[:, None], np.fft.rfftfreq(_ACROSS, _STEP)
+    along, across = np.fft.fftfreq(_ALONG, STEP)[:, None], np.fft.rfftfreq(_ACROSS, STEP)
     waves = np.hypot(along, across)
     within = (waves >= _WAVES[0]) & (waves <= _WAVES[1])
     # a density A n^-3 over the plane has profiles of 2 A n^-2, and twice that where waves have no direction
     density = _SMOOTHEST * _REFERENCE**2 / 4 * np.where(within, waves, math.inf) ** -3
     noise = np.fft.rfft2(rng.standard_normal((_ALONG, _ACROSS)))
-    return np.asarray(np.fft.irfft2(noise * np.sqrt(density) / _STEP, (_ALONG, _ACROSS)))
+    return np.asarray(np.fft.irfft2(noise * np.sqrt(density) / STEP, (_ALONG, _ACROSS)))

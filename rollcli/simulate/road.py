@@ -21,11 +21,10 @@ from rollcli.simulate.materials import (
     Tint,
 )
 from rollcli.simulate.options import GUTTER_WIDTH
-from rollcli.simulate.relief import Relief, draw_relief, lane_plane
+from rollcli.simulate.relief import Array, Relief, draw_relief, lane_plane
 from rollcli.simulate.scene import FAR, ConvexPart, Post, Scene, Solid, TreeCrown, draw, draw_offset
 from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Backdrop, Course, Ground, Wall
-from rollcli.simulate.vectors import Array
 
 
 class Piece(NamedTuple):
@@ -181,11 +180,8 @@ def draw_asphalt(rng: np.random.Generator, carriageway: Carriageway) -> Asphalt:
         marks.append(Mark(middle, 0.13, 12.0, 6.0) if rng.random() < 0.8 else Mark(middle, 0.13))
         if rng.random() < 0.6:
             marks += [Mark(left, 0.12), Mark(right, 0.12)]
-    gutters = (
-        (carriageway.left, carriageway.left + GUTTER_WIDTH),
-        (carriageway.right - GUTTER_WIDTH, carriageway.right),
-    )
-    patches = [Patch(start, end, -50, FAR, -0.2) for start, end in gutters]
+    gutters = carriageway.left, carriageway.right - GUTTER_WIDTH
+    patches = [Patch(start, start + GUTTER_WIDTH, -50, FAR, -0.2) for start in gutters]
     for _ in range(rng.integers(1, 6)):
         x, z = draw(rng, carriageway.left, carriageway.right), draw(rng, 3, 40)
         wide, long = draw(rng, 0.5, 2.0), draw(rng, 0.8, 6.0)

@@ -8,10 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rollcli.simulate.materials import Material, Values, coarse, fine
+from rollcli.simulate.relief import Array, Vectors
 from rollcli.simulate.surfaces import NEAR, Surface, SurfaceSample
-from rollcli.simulate.vectors import Array, dots
 
 _UP = np.eye(3, dtype=np.float32)[:, 1:2]
+
+
+def dots(axes: Vectors, vectors: Vectors) -> Vectors:
+    """Return the components (K, N) of `vectors` (3, N) along each of `axes` (K, 3)."""
+    return np.asarray(np.einsum("ki,in->kn", axes, vectors))
 
 
 class ConvexPart(NamedTuple):

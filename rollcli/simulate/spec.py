@@ -18,7 +18,7 @@ from rollcli.simulate.options import (
     SimulateOptions,
     Span,
 )
-from rollcli.simulate.vectors import Array
+from rollcli.simulate.relief import Array
 from rollcli.simulate.views import Camera, rig_axes
 
 LEVEL = np.array([0.0, 1.0, 0.0])  # the normal of a level road

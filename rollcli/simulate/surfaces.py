@@ -13,8 +13,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.simulate.relief import Relief
-from rollcli.simulate.vectors import Array, Vectors
+from rollcli.simulate.relief import Array, Relief, Vectors
 
 NEAR = 0.05  # metres: nearer surfaces are not hit
 _SEAM = 1e-9  # metres: adjacent grounds overlap by it, so that rounding lets no ray pass between them

@@ -1,5 +1,6 @@
 """Cameras with their sensor, and their views: trace rays, shade what they hit, and expose the image."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -8,9 +9,9 @@ from numpy.typing import NDArray
 
 from rollcli.estimator.moments import strips
 from rollcli.simulate.materials import Material, Values
+from rollcli.simulate.relief import Array, Vectors
 from rollcli.simulate.scene import OVERCAST, Scene, air_below, in_shadow, sky
 from rollcli.simulate.surfaces import Ground, Indices, Surface, SurfaceSample, Wall
-from rollcli.simulate.vectors import Array, Vectors, dot, groups
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,11 @@ def rig_axes(roll: float, pitch: float, normal: Array) -> Array:
     ahead = np.array([0.0, 0.0, 1.0]) - normal[2] * normal
     ahead /= np.linalg.norm(ahead)
     return np.asarray(on_plane @ np.array([np.cross(normal, ahead), normal, ahead]))
+
+
+def dot(a: Vectors, b: Vectors) -> Vectors:
+    """Return a . b for each vector; each of the two is (3, N), (3, 1) or (3,)."""
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 _GREY = np.array([0.114, 0.587, 0.299], np.float32)  # BT.601, as OpenCV's grey
@@ -160,6 +166,14 @@ def trace(scene: Scene, rays: Rays) -> Hits:
         _read(scene, scene.surfaces[k], rays, direction.take(at, axis=1), at, hits)
     _dim_below_cars(scene, rays, hits)
     return hits
+
+
+def groups(labels: NDArray[np.int16], n: int) -> Iterator[tuple[int, Indices]]:
+    """Yield each label from 0 to n - 1 that occurs, and its indices."""
+    order = np.argsort(labels, kind="stable")
+    starts = np.searchsorted(labels[order], np.arange(n + 1))
+    for k in np.flatnonzero(np.diff(starts)):
+        yield int(k), order[starts[k] : starts[k + 1]]
 
 
 def first_hits(scene: Scene, rays: Rays) -> tuple[Array, NDArray[np.int16]]:

@@ -9,7 +9,7 @@ import pytest
 
 from rollcli.simulate.build import build_scene, carriageway_of
 from rollcli.simulate.dataset import lane_rolls_of
-from rollcli.simulate.relief import draw_relief
+from rollcli.simulate.relief import LEFT, STEP, draw_relief
 from rollcli.simulate.spec import FrameSpec
 from tests.slow import mostly_slow
 from tests.true_disparity import true_disparity
@@ -20,9 +20,9 @@ NOWHERE = (-100.0, -100.0)  # tracks and patches: none on the grid
 
 @functools.cache
 def fields(roughness, count):
-    """Random fields (count, along, across) without patches and tracks, and the distance of their nodes."""
+    """Random fields (count, along, across) without patches and tracks."""
     reliefs = [draw_relief(np.random.default_rng(seed), roughness, NOWHERE, NOWHERE) for seed in range(count)]
-    return np.array([relief.heights for relief in reliefs]), reliefs[0].step
+    return np.array([relief.heights for relief in reliefs])
 
 
 def density(first, second, step, axis):
@@ -36,8 +36,8 @@ def density(first, second, step, axis):
 @pytest.mark.parametrize("roughness", ["A", "D"])
 @pytest.mark.parametrize("axis", [1, 2], ids=["along", "across"])
 def test_profiles_have_the_density_of_their_class_in_both_directions(roughness, axis):
-    heights, step = fields(roughness, 3)
-    found, waves = density(heights, heights, step, axis)
+    heights = fields(roughness, 3)
+    found, waves = density(heights, heights, STEP, axis)
     middle = {"A": 16e-6, "D": 1024e-6}[roughness]
     for low, high in ((0.1, 0.2), (0.2, 0.5), (0.5, 1.5)):
         within = (waves >= low) & (waves < high)
@@ -50,7 +50,7 @@ def test_tracks_and_patches_are_where_the_lane_is():
         plain = draw_relief(np.random.default_rng(seed), "C", NOWHERE, NOWHERE)
         sunken = draw_relief(np.random.default_rng(seed), "C", NOWHERE, (-0.8, 0.9))
         change = sunken.heights - plain.heights
-        across = plain.left + plain.step * np.arange(change.shape[1])
+        across = LEFT + STEP * np.arange(change.shape[1])
         assert np.ptp(change[:, np.abs(across) > 2.5]) < 1e-9
         depths = [np.median(change[:, -1]) - change[:, np.abs(across - x).argmin()] for x in (-0.8, 0.9)]
         assert all(depth.min() >= 0 and depth.max() < 4 * 0.003 for depth in depths)
