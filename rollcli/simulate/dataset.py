@@ -10,7 +10,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -36,9 +36,9 @@ from rollcli.simulate.options import KERBED, MIXED, TRUTH, SimulateOptions
 from rollcli.simulate.relief import lane_points, lane_rolls
 from rollcli.simulate.spec import FrameSpec, draw_specs
 
-_PARTS = ("left", "right", "disparity")
-_CALIBRATION, _HEIGHTS = "calib", "heights"
-_OURS = re.compile(r"frame_\d{4,}\.png")
+_VIEWS, _HEIGHTS, _CALIBRATION = ("left", "right", "disparity"), "heights", "calib"
+_ENDINGS = {**dict.fromkeys(_VIEWS, "png"), _HEIGHTS: "tif", _CALIBRATION: "txt"}
+_OURS = re.compile(r"frame_\d{4,}")
 
 
 def truth_csv(frames: Iterable[tuple[str, FrameSpec]]) -> bytes:
@@ -110,8 +110,11 @@ def calibration(spec: FrameSpec) -> bytes:
     return "".join(lines).encode()
 
 
-@dataclass(frozen=True)
-class RenderTask:
+def _path(folder: Path, part: str, stem: str) -> Path:
+    return folder / part / f"{stem}.{_ENDINGS[part]}"
+
+
+class RenderTask(NamedTuple):
     """A frame to render and the names of its files."""
 
     spec: FrameSpec
@@ -119,11 +122,10 @@ class RenderTask:
     stem: str
 
     @property
-    def files(self) -> dict[str, Path]:
-        """The files of the frame: "left", "right", "disparity" and, where it has true ones, "heights"."""
-        files = {part: self.folder / part / f"{self.stem}.png" for part in _PARTS}
-        heights = self.folder / _HEIGHTS / f"{self.stem}.tif"
-        return files if self.spec.dips is None else {**files, _HEIGHTS: heights}
+    def files(self) -> list[Path]:
+        """The files of the frame: both views, the disparity and, where it has true ones, the heights."""
+        parts = _VIEWS if self.spec.dips is None else (*_VIEWS, _HEIGHTS)
+        return [_path(self.folder, part, self.stem) for part in parts]
 
 
 @dataclass(frozen=True)
@@ -153,22 +155,17 @@ class Dataset:
         """The frames that are not there yet."""
         return [task for task in self.tasks if task.stem not in (self.kept or ())]
 
-    @property
-    def nearest_disparity(self) -> float:
-        """The largest disparity of a flat road in any frame, pixels."""
-        return max(map(_nearest_disparity, self.specs))
-
     def calibrations(self) -> dict[Path, bytes]:
         """Make names and contents: calib.txt where all frames share a rig, else one a frame in calib/."""
         contents = {task.stem: calibration(task.spec) for task in self.tasks}
         if len(set(contents.values())) == 1:
             return {self.folder / f"{_CALIBRATION}.txt": next(iter(contents.values()))}
-        return {self.folder / _CALIBRATION / f"{stem}.txt": text for stem, text in contents.items()}
+        return {_path(self.folder, _CALIBRATION, stem): text for stem, text in contents.items()}
 
     def files(self) -> list[Path]:
         """List all files that are written, truth.csv last."""
         record = [] if self.record is None else [Path(run_path(self.folder / TRUTH))]
-        images = (path for task in self.missing for path in task.files.values())
+        images = (path for task in self.missing for path in task.files)
         return [*record, *images, *self.calibrations(), self.folder / TRUTH]
 
 
@@ -192,9 +189,8 @@ def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = No
         A file cannot be written, or a worker died.
     """
     if dataset.kept is None:  # pairs without a row, another rig's calibration
-        single = [dataset.folder / name for name in (TRUTH, f"{_CALIBRATION}.txt")]
         with writing(dataset.folder):
-            for path in (*single, *_earlier_frames(dataset.folder)):
+            for path in _earlier_files(dataset.folder):
                 path.unlink(missing_ok=True)
     if dataset.record is not None:
         text = json.dumps(dataset.record, indent=2).encode() + b"\n"
@@ -212,29 +208,21 @@ def write_dataset(dataset: Dataset, jobs: int | None = 1, stop: Stop | None = No
 
 
 def _write_frame(task: RenderTask) -> str:
-    frame, files = render_frame(task.spec), task.files
-    write_atomic(files["left"], _png(frame.left))
-    write_atomic(files["right"], _png(frame.right))
-    write_atomic(files["disparity"], encode_stored(to_kitti(frame.disparity), "png"))
+    frame = render_frame(task.spec)
+    data = [_png(frame.left), _png(frame.right), encode_stored(to_kitti(frame.disparity), "png")]
     if frame.heights is not None:
-        heights = encode_tiff(frame.heights, description="height over the road, metres")
-        write_atomic(files[_HEIGHTS], heights)
+        data.append(encode_tiff(frame.heights, description="height over the road, metres"))
+    for path, content in zip(task.files, data, strict=True):
+        write_atomic(path, content)
     return task.stem
 
 
 def _lost(task: RenderTask, reason: str) -> str:
-    raise OutputError(f"{task.files['left']}: cannot be rendered: {reason}; try fewer --jobs")
+    raise OutputError(f"{task.files[0]}: cannot be rendered: {reason}; try fewer --jobs")
 
 
 def _remove_leftovers(tasks: Iterable[RenderTask]) -> None:
-    remove_leftovers(path for task in tasks for path in task.files.values())
-
-
-def _nearest_disparity(spec: FrameSpec) -> float:
-    """Return the largest disparity of a flat road, which is linear in the image: largest in one corner."""
-    (width, height), (camera, _) = spec.size, spec.cameras()
-    corners = camera.rays(np.array([0, width - 1] * 2), np.array([0, 0, height - 1, height - 1]))
-    return float((-spec.focal * spec.baseline / spec.height * corners.direction[1]).max())
+    remove_leftovers(path for task in tasks for path in task.files)
 
 
 def _png(image: NDArray[np.uint8]) -> bytes:
@@ -243,14 +231,11 @@ def _png(image: NDArray[np.uint8]) -> bytes:
     return data.tobytes()
 
 
-def _earlier_frames(folder: Path) -> list[Path]:
-    """List the files of frame_0001 and so on, where left, right and disparity all have it."""
-    folders = [folder / part for part in _PARTS]
-    names = set.intersection(*({path.name for path in each.glob("frame_*.png")} for each in folders))
-    ours = [name for name in names if _OURS.fullmatch(name)]
-    calibrations = [(folder / _CALIBRATION / name).with_suffix(".txt") for name in ours]
-    heights = [(folder / _HEIGHTS / name).with_suffix(".tif") for name in ours]
-    return [each / name for name in ours for each in folders] + calibrations + heights
+def _earlier_files(folder: Path) -> list[Path]:
+    """List what a simulation writes: of frame_0001 and so on, where left, right and disparity all have it."""
+    stems = set.intersection(*({path.stem for path in (folder / part).glob("*.png")} for part in _VIEWS))
+    frames = [_path(folder, part, stem) for stem in filter(_OURS.fullmatch, stems) for part in _ENDINGS]
+    return [folder / TRUTH, folder / f"{_CALIBRATION}.txt", *frames]
 
 
 def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: bool = False) -> Dataset:
@@ -277,9 +262,10 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
     if options.kerb is not None and options.scene not in (*KERBED, MIXED):
         raise UsageError(f"--kerb: the scene {options.scene} has no kerbs; {' and '.join(KERBED)} have")
     require_local(str(folder), "pairs are rendered to local disk: name a folder here, and upload it")
-    specs = draw_specs(options)
-    dataset = Dataset(Path(folder), tuple(specs), _record(options))
-    if _is_free(Path(folder)) or overwrite:
+    dataset = Dataset(Path(folder), tuple(draw_specs(options)), _record(options))
+    with writing(folder):
+        is_free = not dataset.folder.is_dir() or not any(dataset.folder.iterdir())
+    if is_free or overwrite:
         return dataset
     if not options.resume:
         raise UsageError(
@@ -287,16 +273,8 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
             "--overwrite begins anew"
         )
     _check_resumable(dataset)
-    whole = (task.stem for task in dataset.tasks if all(map(is_there, task.files.values())))
+    whole = (task.stem for task in dataset.tasks if all(map(is_there, task.files)))
     return replace(dataset, kept=frozenset(whole))
-
-
-def _is_free(folder: Path) -> bool:
-    """Tell whether the folder is empty or does not exist."""
-    with writing(folder):
-        if folder.exists() and not folder.is_dir():
-            raise UsageError(f"{folder}: is a file, not a folder to write to")
-        return not folder.is_dir() or not any(folder.iterdir())
 
 
 def _record(options: SimulateOptions) -> Mapping[str, Any]:
@@ -314,17 +292,18 @@ def _check_resumable(dataset: Dataset) -> None:
     UsageError
         Says what differs.
     """
-    name, record = str(dataset.folder), run_path(TRUTH)
     try:
         was = read_run(dataset.folder / TRUTH)
-    except InputError as error:
-        raise not_resumable(name, f"{record} is damaged") from error
+    except InputError:
+        was = {}
     if was is None:
-        raise not_resumable(name, f"there is no {record}")
-    if not isinstance(was.get("rollcli"), str) or not isinstance(was.get("options"), dict):
-        raise not_resumable(name, f"{record} is damaged")
-    for difference in differences(was, dataset.record or {}):
-        raise not_resumable(name, difference)
+        found = f"there is no {run_path(TRUTH)}"
+    elif isinstance(was.get("rollcli"), str) and isinstance(was.get("options"), dict):
+        found = next(differences(was, dataset.record or {}), "")
+    else:
+        found = f"{run_path(TRUTH)} is damaged"
+    if found:
+        raise not_resumable(str(dataset.folder), found)
 
 
 def run_simulate(
@@ -352,9 +331,10 @@ def run_simulate(
     if running.dry_run:
         sys.stdout.writelines(f"write {path}\n" for path in dataset.files())
         return ExitStatus.DONE
-    if dataset.nearest_disparity > KITTI_TOP and not running.quiet:
+    nearest = max(spec.nearest_disparity for spec in dataset.specs)
+    if nearest > KITTI_TOP and not running.quiet:
         say(
-            f"the road reaches {dataset.nearest_disparity:.0f} px of disparity: what exceeds "
+            f"the road reaches {nearest:.0f} px of disparity: what exceeds "
             f"{KITTI_TOP:.0f} px does not fit a KITTI PNG and has no data in {dataset.folder}/disparity"
         )
     progress = TaskProgress(len(dataset.specs), quiet=running.quiet, verbose=running.verbose)

@@ -107,6 +107,13 @@ class FrameSpec(Rendering):
         first, second = (Camera(*self.size, self.focal, self.centre, axes, place) for place in places)
         return first, second
 
+    @property
+    def nearest_disparity(self) -> float:
+        """The largest disparity of a flat road, pixels; linear in the image, it is largest in a corner."""
+        (width, height), (camera, _) = self.size, self.cameras()
+        corners = camera.rays(np.array([0, width - 1] * 2), np.array([0, 0, height - 1, height - 1]))
+        return float((-self.focal * self.baseline / self.height * corners.direction[1]).max())
+
     def rng(self, stream: Stream) -> np.random.Generator:
         """Return the generator of one part of the frame."""
         return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.index, stream)))
