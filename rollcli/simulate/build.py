@@ -172,10 +172,8 @@ def true_heights(scene: Scene, spec: FrameSpec, camera: Camera, view: View) -> V
     The road is the carriageway without dips, bumps and gutters, which goes on beyond its edges as it is at
     them.
     """
-    carriageway = carriageway_of(spec)
-    section = cross_section(
-        spec.cross_section, spec.crossfall, 0.0, carriageway.left, carriageway.right, carriageway.course.bend
-    )
+    carriageway, smooth = carriageway_of(spec), replace(spec, gutter=0.0)
+    section = cross_section(smooth, carriageway.left, carriageway.right, carriageway.course.bend)
     seen = np.array([isinstance(each, Ground) for each in scene.surfaces] + [False])[view.surface]
     v, u = np.nonzero(seen)
     rays, course = camera.rays(u, v), carriageway.course

@@ -1,30 +1,17 @@
-"""The carriageway, with its course, cross-section and surface, and the objects beside it and on it."""
+"""The carriageway, with its course, cross-section and surface, and the objects beside it."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from rollcli.simulate.materials import (
-    GREY,
-    WARM,
-    Asphalt,
-    CarPaint,
-    Facade,
-    Glass,
-    Leaves,
-    Mark,
-    Material,
-    Patch,
-    Paving,
-    Plain,
-    Tint,
-)
+from rollcli.simulate.materials import WARM, Asphalt, Facade, Leaves, Mark, Patch, Paving, Plain, Tint
 from rollcli.simulate.options import GUTTER_WIDTH
 from rollcli.simulate.relief import Array, Relief, draw_relief, lane_plane
-from rollcli.simulate.scene import FAR, ConvexPart, Post, Scene, Solid, TreeCrown, draw, draw_offset
+from rollcli.simulate.scene import FAR, Post, Scene, Solid, TreeCrown, draw, draw_offset
 from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Backdrop, Course, Ground, Wall
+from rollcli.simulate.vehicles import Shape, car_materials, extruded, rectangle, vehicle
 
 
 class Piece(NamedTuple):
@@ -62,40 +49,35 @@ class CrossSection:
         return self.piece(inside).elevation(inside)
 
 
-def cross_section(
-    shape: str, crossfall: float, gutter: float, left: float, right: float, bend: float
-) -> CrossSection:
+def cross_section(spec: FrameSpec, left: float, right: float, bend: float) -> CrossSection:
     """Make the cross section of a carriageway.
 
     Parameters
     ----------
-    shape : str
-        One of `CROSS_SECTIONS`.
-    crossfall, gutter : float
-        Slopes in metres per metre: the steepest of the carriageway, and how much steeper its outer
-        `GUTTER_WIDTH` falls outward.
+    spec : FrameSpec
+        Says its shape, the crossfall, and how much steeper its outer `GUTTER_WIDTH` falls outward.
     left, right : float
         The edges (lateral, metres).
     bend : float
         The road's horizontal curvature, 1/m: superelevation raises the outer side of a bend. A straight
         road falls to the right.
     """
-    middle, half = (left + right) / 2, (right - left) / 2
+    middle, half, crossfall = (left + right) / 2, (right - left) / 2, spec.crossfall
     start, end = middle - half, middle + half
     pieces = [Piece(start, end)]
-    if shape == "roof":
+    if spec.cross_section == "roof":
         rising = Piece(start, middle, crossfall, offset=-2 * crossfall * middle)
         pieces = [rising, Piece(middle, end, -crossfall)]
-    elif shape in ("crown", "dish"):
-        camber = (crossfall if shape == "dish" else -crossfall) / half
+    elif spec.cross_section in ("crown", "dish"):
+        camber = (crossfall if spec.cross_section == "dish" else -crossfall) / half
         pieces = [Piece(start, end, -camber * middle, camber)]
-    elif shape == "superelevated":
+    elif spec.cross_section == "superelevated":
         pieces = [Piece(start, end, crossfall if bend < 0 else -crossfall)]
-    if gutter:
+    if spec.gutter:
         inner, outer = start + GUTTER_WIDTH, end - GUTTER_WIDTH
         gutters = (
-            _straight(start, inner, inner, pieces[0], gutter),
-            _straight(outer, end, outer, pieces[-1], -gutter),
+            _straight(start, inner, inner, pieces[0], spec.gutter),
+            _straight(outer, end, outer, pieces[-1], -spec.gutter),
         )
         pieces[0] = pieces[0]._replace(start=inner)
         pieces[-1] = pieces[-1]._replace(end=outer)
@@ -164,7 +146,7 @@ def draw_carriageway(rng: np.random.Generator, spec: FrameSpec) -> Carriageway:
     shoulder = 2.2 if parking else draw(rng, 0.1, 0.6)
     left = shift - (0.5 if single else 1.5) * lane - shoulder
     right = shift + 0.5 * lane + shoulder
-    section = cross_section(spec.cross_section, spec.crossfall, spec.gutter, left, right, course.bend)
+    section = cross_section(spec, left, right, course.bend)
     relief = None
     if spec.roughness is not None:
         wheels = shift - lane / 4, shift + lane / 4
@@ -195,135 +177,6 @@ def draw_asphalt(rng: np.random.Generator, carriageway: Carriageway) -> Asphalt:
         seams=tuple(draw(rng, carriageway.left, carriageway.right) for _ in range(rng.integers(1, 4))),
         offset=draw_offset(rng),
     )
-
-
-Outline = tuple[tuple[float, float], ...]
-
-
-class _Shape(NamedTuple):
-    """A convex outline seen from the right, (ahead, up) in metres, clockwise, extruded to both sides.
-
-    `taper` is the inward slope of the sides, `centre` the offset to the right of the middle, metres.
-    """
-
-    outline: Outline
-    material: int
-    half_width: float
-    taper: float = 0.0
-    centre: float = 0.0
-
-
-def _rectangle(back: float, front: float, low: float, high: float) -> Outline:
-    return ((back, low), (back, high), (front, high), (front, low))
-
-
-def _wheel(ahead: float, radius: float) -> Outline:
-    angles = np.arange(10) * -np.pi / 5
-    return tuple((ahead + radius * float(np.cos(a)), radius + radius * float(np.sin(a))) for a in angles)
-
-
-_FAR = 40.0  # metres: vehicles farther away are drawn without their small parts
-_SILHOUETTE = 5
-
-_PAINTS: tuple[tuple[float, Tint], ...] = (
-    (0.70, GREY),
-    (0.35, GREY),
-    (0.06, GREY),
-    (0.25, (0.35, 0.35, 1.3)),
-    (0.22, (1.3, 0.7, 0.4)),
-    (0.20, (0.6, 1.0, 0.6)),
-)
-_GLASS, _BLACK, _RED, _WHITE, _CARGO = range(len(_PAINTS), len(_PAINTS) + 5)
-
-
-def car_materials(offset: float) -> list[Material]:
-    """Return the materials of `vehicle` in order: paints, glass, tyres, red and white lights, cargo box."""
-    paints: list[Material] = [CarPaint(level, tint=tint, offset=offset) for level, tint in _PAINTS]
-    return [
-        *paints,
-        Glass(tint=(1.05, 1.0, 0.95), offset=offset),
-        Plain(0.03, 0.3, 0.1),
-        Plain(0.45, 0.05, 0.05, tint=(0.15, 0.15, 1.0)),
-        Plain(0.7, 0.1, 0.1),
-        Plain(0.55, 0.04, 0.08, joint=1.1, tint=(0.97, 0.99, 1.0), offset=offset),
-    ]
-
-
-def vehicle(
-    rng: np.random.Generator,
-    course: Course,
-    ground: Piece,
-    lateral: float,
-    z: float,
-    first_material: int,
-    oncoming: bool,
-) -> Solid:
-    """Draw a car, or with a probability of 1/6 a truck, at (lateral, z) on the ground.
-
-    An oncoming one faces the camera. `first_material` is the index of the first of `car_materials`.
-    """
-    paint, tall = int(rng.integers(len(_PAINTS))), float(rng.uniform(0.95, 1.25))
-    shapes = _truck(paint) if rng.random() < 1 / 6 else _car(paint)
-    if z > _FAR:
-        shapes = shapes[:_SILHOUETTE]
-    parts = tuple(_extrude(shape, tall, first_material + shape.material) for shape in shapes)
-    half_width = max(shape.half_width + abs(shape.centre) for shape in shapes)
-    ahead, up = np.array([point for shape in shapes for point in shape.outline]).T
-    extent = np.array([[-half_width, half_width], [0.0, tall * up.max()], [ahead.min(), ahead.max()]])
-    about = np.array([[-1.0], [1.0], [-1.0]]) if oncoming else 1.0
-    frame = about * course.frame(z, ground.slope_at(lateral))
-    return Solid(frame, course.point(lateral, z, ground.elevation(lateral)), parts, extent)
-
-
-def _car(paint: int) -> tuple[_Shape, ...]:
-    hood, tail = (0.95, 0.95), (-2.12, 0.95)
-    body = ((-2.10, 0.28), (-2.20, 0.55), tail, hood, (2.02, 0.80), (2.15, 0.50), (2.08, 0.26))
-    cabin = ((-1.95, 0.93), (-1.45, 1.42), (0.25, 1.42), (1.10, 0.93))
-    roof = ((-1.50, 1.39), (-1.42, 1.46), (0.22, 1.46), (0.30, 1.39))
-    rear, front = _rectangle(-2.23, -2.0, 0.68, 0.85), _rectangle(1.95, 2.16, 0.58, 0.72)
-    return (
-        _Shape(body, paint, 0.90, taper=0.10),
-        _Shape(cabin, _GLASS, 0.86, taper=0.35),
-        _Shape(roof, paint, 0.72, taper=0.35),
-        _Shape(_wheel(1.35, 0.32), _BLACK, 0.89),
-        _Shape(_wheel(-1.35, 0.32), _BLACK, 0.89),
-        _Shape(rear, _RED, 0.13, centre=0.62),
-        _Shape(rear, _RED, 0.13, centre=-0.62),
-        _Shape(front, _WHITE, 0.15, centre=0.62),
-        _Shape(front, _WHITE, 0.15, centre=-0.62),
-        _Shape(_rectangle(1.95, 2.17, 0.45, 0.62), _BLACK, 0.40),
-        _Shape(_rectangle(-2.22, -2.0, 0.50, 0.61), _WHITE, 0.26),
-    )
-
-
-def _truck(paint: int) -> tuple[_Shape, ...]:
-    cab = ((2.0, 0.5), (2.0, 2.45), (3.2, 2.45), (3.7, 1.5), (3.7, 0.5))
-    rear = _rectangle(-3.93, -3.7, 0.70, 0.88)
-    return (
-        _Shape(_rectangle(-3.9, 1.8, 0.95, 3.0), _CARGO, 1.22),
-        _Shape(cab, paint, 1.15),
-        _Shape(_rectangle(-3.85, 3.5, 0.55, 0.95), _BLACK, 0.9),
-        _Shape(_wheel(2.7, 0.42), _BLACK, 1.12),
-        _Shape(_wheel(-2.4, 0.42), _BLACK, 1.18),
-        _Shape(((2.5, 1.55), (2.5, 2.3), (3.31, 2.3), (3.72, 1.55)), _GLASS, 1.17),
-        _Shape(rear, _RED, 0.15, centre=0.95),
-        _Shape(rear, _RED, 0.15, centre=-0.95),
-        _Shape(_rectangle(-3.92, -3.7, 0.70, 0.82), _WHITE, 0.26),
-        _Shape(_rectangle(3.5, 3.73, 0.70, 0.85), _WHITE, 1.05),
-    )
-
-
-def _extrude(shape: _Shape, tall: float, material: int) -> ConvexPart:
-    """Return the solid of a shape whose heights are multiplied by `tall`."""
-    outline: Array = np.array(shape.outline) * [1.0, tall]
-    edges = np.roll(outline, -1, axis=0) - outline
-    out = np.stack([np.zeros(len(edges)), edges[:, 0], -edges[:, 1]], axis=1)
-    normals = np.concatenate([out, [[1.0, shape.taper, 0.0], [-1.0, shape.taper, 0.0]]])
-    reach = shape.half_width + shape.taper * outline[:, 1].min()
-    heights = out[:, 2] * outline[:, 0] + out[:, 1] * outline[:, 1]
-    offsets = np.concatenate([heights, [reach + shape.centre, reach - shape.centre]])
-    length = np.linalg.norm(normals, axis=1)
-    return ConvexPart(normals / length[:, None], offsets / length, material)
 
 
 _GRASS: Tint = (0.45, 1.0, 0.72)
@@ -407,7 +260,7 @@ class Site:
             middle = float(edges[i] + half)
             # set back: the body is straight, and must stay behind a front that follows the bend
             place = course.point(front + side * (depth + 0.25), middle, base)
-            body = _extrude(_Shape(_rectangle(-half, half, 0.0, height), plaster, depth), 1.0, plaster)
+            body = extruded(Shape(rectangle(-half, half, 0.0, height), plaster, depth))
             self.scene.surfaces.append(Solid(course.frame(middle), place, (body,), extent))
 
     def add_hedge(self, lateral: float, base: float) -> None:
@@ -460,10 +313,12 @@ class Site:
                 z += rng.uniform(8.2, 10)
         first, middle = len(self.scene.materials), road.shift - road.lane / 2
         self.scene.materials += car_materials(draw_offset(rng))
-        self.scene.cars += [
-            vehicle(rng, road.course, road.section.piece(x), float(x), float(z), first, x < middle)
-            for x, z in places
-        ]
+        for x, z in places:
+            ground = road.section.piece(x)
+            facing = np.array([[-1.0], [1.0], [-1.0]]) if x < middle else 1.0
+            frame = facing * road.course.frame(z, ground.slope_at(x))
+            place = road.course.point(x, z, ground.elevation(x))
+            self.scene.cars.append(vehicle(rng, frame, place, first))
         self.scene.surfaces += self.scene.cars
 
     def add_backdrop(self) -> None:

@@ -141,7 +141,10 @@ def draw_specs(options: SimulateOptions) -> list[FrameSpec]:
 
 
 def _drawn(spec: FrameSpec, options: SimulateOptions) -> FrameSpec:
-    """Return the frame with its pose, its road and the place of its camera, each from a stream of its own."""
+    """Return the frame with the place of its camera, its pose and its road, each from a stream of its own."""
+    rng = spec.rng(Stream.RIG)
+    spec = replace(spec, height=float(rng.uniform(*options.height)))
+    spec = _offset(spec, *(float(rng.uniform(*options.principal_offset)) for _ in range(2)))
     rng = spec.rng(Stream.POSE)
     roll, pitch = (math.radians(rng.uniform(*span)) for span in (options.roll_deg, options.pitch_deg))
     scene = SCENES[rng.integers(len(SCENES))] if options.scene == MIXED else options.scene
@@ -150,6 +153,7 @@ def _drawn(spec: FrameSpec, options: SimulateOptions) -> FrameSpec:
         curvature = rng.uniform(*options.curvature)
     elif scene == "bare":
         curvature = 0.0
+    spec = replace(spec, scene=scene, roll=roll, pitch=pitch, curvature=float(curvature))
     rng = spec.rng(Stream.CROSS_SECTION)
     spans = options.crossfall or CROSSFALL, options.gutter
     crossfall, gutter = (float(rng.uniform(*span)) / 100 for span in spans)
@@ -157,21 +161,8 @@ def _drawn(spec: FrameSpec, options: SimulateOptions) -> FrameSpec:
     if shape == MIXED:
         shape = CROSS_SECTIONS[rng.integers(len(CROSS_SECTIONS))]
     bend = None if options.bend is None else float(rng.uniform(*options.bend))
-    rng = spec.rng(Stream.RIG)
-    spec = replace(
-        spec,
-        scene=scene,
-        roll=roll,
-        pitch=pitch,
-        curvature=float(curvature),
-        cross_section=shape,
-        crossfall=0.0 if shape == "flat" else crossfall,
-        gutter=gutter,
-        bend=bend,
-        height=float(rng.uniform(*options.height)),
-    )
-    right, down = (float(rng.uniform(*options.principal_offset)) for _ in range(2))
-    return _offset(spec, right, down)
+    crossfall = 0.0 if shape == "flat" else crossfall
+    return replace(spec, cross_section=shape, crossfall=crossfall, gutter=gutter, bend=bend)
 
 
 def _offset(spec: FrameSpec, right: float, down: float) -> FrameSpec:

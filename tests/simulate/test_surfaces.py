@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from rollcli.simulate.build import build_scene
-from rollcli.simulate.road import Piece, vehicle
 from rollcli.simulate.scene import Post
 from rollcli.simulate.spec import FrameSpec
 from rollcli.simulate.surfaces import Backdrop, Course, Ground, Wall
+from rollcli.simulate.vehicles import vehicle
 from rollcli.simulate.views import first_hits
 
 COURSE = Course(heading=0.03, bend=1 / 300, curvature=0.001)
@@ -18,7 +18,8 @@ GROUND = Ground(COURSE, (-4.0, 1.0, 9.0), (0, 1), far=80.0, slope=0.1, offset=-0
 DISH = Ground(COURSE, (-4.0, 1.0, 9.0), (0, 1), far=80.0, offset=-0.2, camber=0.03)
 WALL = Wall(COURSE, -6.0, 0.0, np.array([-5.0, 20.0, 50.0]), np.array([9.0, 4.0]), 0)
 BACKDROP = Backdrop(COURSE, 60.0, -5.0, np.full(200, 7.0), 0)
-CAR = vehicle(np.random.default_rng(3), COURSE, Piece(-5, 5), 1.0, 9.0, 0, oncoming=True)
+TURNED = COURSE.frame(9.0) * [[-1], [1], [-1]]  # it faces the camera
+CAR = vehicle(np.random.default_rng(3), TURNED, COURSE.point(1.0, 9.0), 0)
 POST = Post(COURSE.point(2.0, 8.0), 0.3, 4.0, 0)
 
 
