@@ -122,34 +122,31 @@ def assess(
         example = f": it holds {rows[0].file}, the truth {next(iter(truth))}" if rows else ": it is empty"
         raise UsageError(f"{result_name}: no row has the stem of a frame of the truth{example}")
     known = [(rows[place], truth[stem]) for stem, place in places.items() if stem in truth]
-    angled = [(row, pose) for row, pose in known if row.roll_deg is not None]
-    pitch = _accuracy([(row, row.pitch_deg, pose.pitch_deg, row.pitch_ci95_deg) for row, pose in known])
-    height = _accuracy([(row, row.height_m, pose.height_m, row.height_ci95_m) for row, pose in known])
+    rolls = [(row, row.roll_deg, math.degrees(pose.theta), row.roll_ci95_deg) for row, pose in known]
+    statuses = [row.status for row, _ in known if row.roll_deg is not None]
     return Comparison(
-        roll=_accuracy(
-            [(row, row.roll_deg, math.degrees(pose.theta), row.roll_ci95_deg) for row, pose in angled],
-            period=180,
-        ),
-        ok=sum(row.status == "ok" for row, _ in angled),
-        suspect=sum(row.status == "suspect" for row, _ in angled),
+        roll=_accuracy(rolls, period=180) or Accuracy(),
+        ok=statuses.count("ok"),
+        suspect=statuses.count("suspect"),
         no_angle=tuple(s for s in truth if s not in places or rows[places[s]].roll_deg is None),
         no_truth=tuple(rows[place].file for stem, place in places.items() if stem not in truth),
-        pitch=pitch if pitch.count else None,
-        height=height if height.count else None,
+        pitch=_accuracy([(row, row.pitch_deg, pose.pitch_deg, row.pitch_ci95_deg) for row, pose in known]),
+        height=_accuracy([(row, row.height_m, pose.height_m, row.height_ci95_m) for row, pose in known]),
     )
 
 
-def _accuracy(
-    compared: Sequence[tuple[Row, float | None, float | None, float | None]], period: float = math.inf
-) -> Accuracy:
-    """Sum up rows, each with its value, the known one and the half-width of its interval."""
+_Compared = tuple[Row, float | None, float | None, float | None]
+
+
+def _accuracy(compared: Sequence[_Compared], period: float = math.inf) -> Accuracy | None:
+    """Sum up rows, each with its value, the known one and the half-width of its interval; None of nothing."""
     found = [
         (row.file, math.remainder(value - known, period), half_width)  # angles half a turn apart are the same
         for row, value, known, half_width in compared
         if value is not None and known is not None
     ]
     if not found:
-        return Accuracy()
+        return None
     errors = np.array([error for _, error, _ in found])
     worst = int(np.abs(errors).argmax())
     inside = [abs(error) <= half_width for _, error, half_width in found if half_width is not None]
@@ -199,7 +196,10 @@ def assess_heights(
     InputError
         A map cannot be read, or two of a frame differ in size.
     """
-    folders = [_maps_of(folder) for folder in (heights, f"{truth}/heights", f"{truth}/disparity")]
+    folders = [
+        {stem_of(each.name): each.location for each in find_inputs([folder], Search(recursive=True))}
+        for folder in (heights, f"{truth}/heights", f"{truth}/disparity")
+    ]
     errors: dict[int, list[NDArray[np.float64]]] = {distance: [] for distance in DISTANCES_M}
     worst = dict.fromkeys(DISTANCES_M, 0.0)
     compared = False
@@ -242,14 +242,10 @@ def _height_errors(
             yield distance, found
 
 
-def _maps_of(folder: str) -> dict[str, str]:
-    return {stem_of(each.name): each.location for each in find_inputs([folder], Search(recursive=True))}
-
-
-_NAMES = {"no_angle", "no_truth"}
 _DIGITS = 6
 _OF_POSE = ("count", "median", "p95", "worst", "bias", "coverage_95")
-_LENGTHS = {"median", "p95", "worst", "bias"}  # what has the unit of the quantity
+# what has the unit of the quantity, in words
+_LENGTHS = {"median": "median error", "p95": "95th percentile", "worst": "worst", "bias": "mean, signed"}
 
 
 def as_table(found: Comparison) -> str:
@@ -259,7 +255,7 @@ def as_table(found: Comparison) -> str:
         ("frames compared", f"{roll.count}" + (f" ({found.suspect} suspect)" if found.suspect else "")),
         ("without an angle", str(len(found.no_angle))),
         ("without a known angle", str(len(found.no_truth))),
-        *_lines("", roll, "degrees", f"  {roll.worst_file}".rstrip()),
+        *_lines("", roll, "degrees"),
         (f"above {LARGE_ERROR_DEG:g} degrees", _percent(roll.share_above_0_5_deg, roll.count)),
         ("inside the 95 % interval", _percent(roll.coverage_95, roll.intervals)),
     ]
@@ -277,18 +273,11 @@ def as_table(found: Comparison) -> str:
     return "".join(f"{name:{width}}{value}\n" for name, value in lines)
 
 
-def _lines(name: str, part: Accuracy, unit: str, worst: str = "") -> list[tuple[str, str]]:
-    """Return the figures of a quantity in words; `worst` names the frame of the largest error."""
-    figures = (
-        ("median error", part.median, ""),
-        ("95th percentile", part.p95, ""),
-        ("worst", part.worst, worst),
-        ("mean, signed", part.bias, ""),
-    )
-    return [
-        (f"{name}{words}", "-" if value is None else f"{value:.4f} {unit}{more}")
-        for words, value, more in figures
-    ]
+def _lines(name: str, part: Accuracy, unit: str) -> Iterator[tuple[str, str]]:
+    """Yield the figures of a quantity in words; of roll, which has no name, with the frame of the worst."""
+    for figure, words in _LENGTHS.items():
+        value, more = getattr(part, figure), "" if name or figure != "worst" else f"  {part.worst_file}"
+        yield f"{name}{words}", "-" if value is None else f"{value:.4f} {unit}{more}"
 
 
 def _percent(share: float | None, of: int) -> str:
@@ -298,7 +287,7 @@ def _percent(share: float | None, of: int) -> str:
 def as_csv(found: Comparison) -> str:
     """Return a header and one line."""
     values = _values(found)
-    line = [len(value) if name in _NAMES else value for name, value in values.items()]
+    line = [len(value) if isinstance(value, tuple) else value for value in values.values()]
     return csv_table([values, line]).decode("utf-8", "surrogateescape")
 
 
