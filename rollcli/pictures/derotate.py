@@ -197,6 +197,4 @@ def _no_data(values: NDArray[Any], valid: Flags) -> float:
     unused = values[~valid]
     if values.dtype.kind == "i":
         return min(int(unused.min()), 0)
-    if np.isnan(unused).any():
-        return math.nan
-    return float(unused.max() if np.isinf(unused).any() else unused.min())
+    return float(unused.min() if np.isfinite(unused).all() else unused.max())  # NaN is the largest

@@ -28,18 +28,20 @@ _SETTINGS = threading.Lock()  # matplotlib has one set of them for all threads
 COLUMN = 3.5 * 72  # pt: the width of a column in journals of two columns
 _STYLE: dict[Any, Any] = {
     "axes.axisbelow": True,
-    "axes.edgecolor": f"#{LIGHT['line']}",
     "axes.grid": True,
-    "axes.labelcolor": f"#{LIGHT['text']}",
     "grid.color": f"#{LIGHT['grid']}",
     "legend.frameon": False,
     "pdf.fonttype": 42,  # letters stay letters
     "svg.fonttype": "none",
-    "text.color": f"#{LIGHT['text']}",
-    "xtick.color": f"#{LIGHT['line']}",
-    "xtick.labelcolor": f"#{LIGHT['text']}",
-    "ytick.color": f"#{LIGHT['line']}",
-    "ytick.labelcolor": f"#{LIGHT['text']}",
+    **dict.fromkeys(("axes.edgecolor", "xtick.color", "ytick.color"), f"#{LIGHT['line']}"),
+    **dict.fromkeys(("axes.labelcolor", "text.color"), f"#{LIGHT['text']}"),
+    **dict.fromkeys(("xtick.labelcolor", "ytick.labelcolor"), f"#{LIGHT['text']}"),
+}
+# what a file would say of when and with what it was made
+_LEFT_OUT = {
+    "svg": ("Date", "Creator", "Format", "Type"),
+    "pdf": ("CreationDate", "Creator", "Producer"),
+    "png": ("Software",),
 }
 
 
@@ -79,13 +81,7 @@ def figure_file(figure: Figure, kind: str, title: str) -> bytes:
     title : str
         What it shows, for those who cannot see it.
     """
-    metadata: dict[str, str | None] = {"Title": title}
-    if kind == "svg":
-        metadata |= dict.fromkeys(("Date", "Creator", "Format", "Type"))
-    elif kind == "pdf":
-        metadata |= dict.fromkeys(("CreationDate", "Creator", "Producer"))
-    else:
-        metadata |= {"Software": None}
+    metadata = {"Title": title, **dict.fromkeys(_LEFT_OUT[kind])}
     buffer = io.BytesIO()
     dots = 600 if figure.get_figwidth() * 72 <= 2 * COLUMN else 144
     figure.savefig(buffer, format=kind, dpi=dots, metadata=metadata, facecolor=f"#{LIGHT['card']}")

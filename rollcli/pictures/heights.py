@@ -182,11 +182,11 @@ def heights_over(disparity: NDArray[Any], road: FittedRoad, calibration: Calibra
     if profile is None:
         return heights
     measured = calibration if unit_of(calibration) == METRES else None
-    profile = profile.along(disparity, road)
+    profile = profile.along(disparity)
     columns = np.arange(road.width, dtype=np.float32)
     for some in strips(road.height, _BLOCK // road.width):
         rows = np.arange(some.start, some.stop, dtype=np.float32)
-        heights[some] = _heights(disparity[some], columns, rows[:, None], road, profile, measured)
+        heights[some] = profile.heights(disparity[some], columns, rows[:, None], measured)
     return heights
 
 
@@ -211,6 +211,7 @@ class _Profile:
     `further` is how many px further down the road has each disparity than that, in steps of 1 / `_PER_PX` px.
     """
 
+    road: FittedRoad
     row: float
     disparity: float
     rise: float
@@ -234,15 +235,15 @@ class _Profile:
         # of the two rows with that disparity the one on the rising branch, in a form that bears a2 = 0
         c0, c1 = road.model.disparity_along(centre), a1 + 2 * a2 * centre
         row = centre + (2 * (half - c0) / (c1 + rise) if c1 > 0 else (rise - c1) / (2 * a2))
-        return cls(row, half, rise, a2)
+        return cls(road, row, half, rise, a2)
 
-    def along(self, disparity: NDArray[Any], road: FittedRoad) -> "_Profile":
+    def along(self, disparity: NDArray[Any]) -> "_Profile":
         """Fit what the parabola leaves of the lane's profile in a map.
 
         In bins of distance it is the median across the lane, which dips, kerbs and cars do not move. Through
         these goes 1, d, 1/d, d^2 with Tukey's weights: that is a hill, and too stiff for a dip.
         """
-        d, side, gap = self._sampled(disparity, road)
+        d, side, gap = self._sampled(disparity)
         bottom = 2 * self.disparity
         share = 1 - np.log(bottom / d) / math.log(_FAR)
         near = (np.abs(side) < _HALF_LANE) & (share > 0) & (share < 1 + _OVER)
@@ -267,16 +268,16 @@ class _Profile:
         kept = np.clip(steps / _PER_PX, middles[used[0]], middles[used[-1]])
         return replace(self, further=(_profile_basis(kept / bottom) @ -fitted).astype(np.float32))
 
-    def _sampled(self, disparity: NDArray[Any], road: FittedRoad) -> tuple[Singles, Singles, Singles]:
+    def _sampled(self, disparity: NDArray[Any]) -> tuple[Singles, Singles, Singles]:
         """Return disparity, place across in camera heights and px above the parabola of some pixels."""
         down, right = (max(1, side // few) for side, few in zip(disparity.shape, _SAMPLED, strict=True))
         some = disparity[::down, ::right]
-        rows = np.arange(0, road.height, down, dtype=np.float32)[:, None]
-        columns = np.arange(0, road.width, right, dtype=np.float32)
-        heights = _heights(some, columns, rows, road, self, None)
+        rows = np.arange(0, self.road.height, down, dtype=np.float32)[:, None]
+        columns = np.arange(0, self.road.width, right, dtype=np.float32)
+        heights = self.heights(some, columns, rows, None)
         known = np.isfinite(heights)
         d = some[known].astype(np.float32)
-        side = road.across(columns, rows)[known] * np.float32(road.middle_rise) / d
+        side = self.road.across(columns, rows)[known] * np.float32(self.road.middle_rise) / d
         return d, side, heights[known] * d / np.float32(self.rise)
 
     def at(self, disparity: Singles) -> tuple[Singles, Singles]:
@@ -293,6 +294,43 @@ class _Profile:
             steps = np.minimum(disparity * np.float32(_PER_PX), np.float32(len(self.further) - 1))
             foot += self.further.take(steps.astype(np.intp))
         return foot, rise
+
+    def heights(
+        self, stored: NDArray[Any], columns: Singles, rows: Singles, calibration: Calibration | None
+    ) -> Singles:
+        """Return the heights of the pixels of columns (W,) and rows (H, 1), shape (H, W).
+
+        The calibration has a baseline; None: heights are in camera heights.
+        """
+        road = self.road
+        cosine, sine, camber = math.cos(road.model.theta), math.sin(road.model.theta), road.model.camber
+        doffs = 0.0 if calibration is None else calibration.doffs
+        d = stored.astype(np.float32)
+        known = (d > max(0.0, -doffs)) & (d <= LARGEST)
+        d[~known] = self.disparity
+        rest: Singles | np.float32 = np.float32(1)
+        root: Singles | np.float32 = np.float32(1)
+        if camber:
+            across = road.across(columns, rows)
+            side, rest, root = _cambered(d, across, road)
+        foot, rise = self.at(d * rest)
+        rise *= root
+        gap = foot + columns * np.float32(sine) - (rows * np.float32(cosine) - np.float32(self.row))
+        if calibration is None:
+            return np.where(known, gap * np.float32(self.rise) / d, np.float32(np.nan))
+        # |q| of the planes that touch the road, by their rise, 1/m
+        aspect, shifted = calibration.fy / calibration.fx, d + np.float32(doffs)
+        along = calibration.cy * cosine - calibration.cx * sine - self.row
+        ahead = shifted * rest / rise - foot + np.float32(along)
+        lean: Singles | np.float32 = np.float32(sine**2 + (aspect * cosine) ** 2)
+        if camber:
+            tilt = side / rise * np.float32(camber * road.middle_rise)
+            ahead += tilt * (np.float32(road.across(calibration.cx, calibration.cy)) - across)
+            skew = np.float32(2 * (aspect**2 - 1) * cosine * sine)
+            lean = (tilt * np.float32(cosine**2 + (aspect * sine) ** 2) + skew) * tilt + lean
+        ahead *= np.float32(1 / calibration.fx)
+        length = np.sqrt(ahead * ahead + lean) * np.float32(1 / (calibration.baseline or 1.0))
+        return np.where(known, gap / (length * shifted), np.float32(np.nan))
 
 
 def _profile_basis(x: NDArray[Any]) -> NDArray[Any]:
@@ -316,48 +354,6 @@ def _steady_fit(design: Floats, values: Floats, found: Flags) -> tuple[NDArray[A
         spread = max(1.4826 * float(np.sort(off[found])[middle]), _LEAST_SPREAD)
         weights = found * np.square(np.maximum(1 - np.square(off / (6 * spread)), 0))
     return fitted, weights
-
-
-def _heights(
-    stored: NDArray[Any],
-    columns: Singles,
-    rows: Singles,
-    road: FittedRoad,
-    profile: _Profile,
-    calibration: Calibration | None,
-) -> Singles:
-    """Return the heights of the pixels of columns (W,) and rows (H, 1), shape (H, W).
-
-    The calibration has a baseline; None: heights are in camera heights.
-    """
-    cosine, sine, camber = math.cos(road.model.theta), math.sin(road.model.theta), road.model.camber
-    doffs = 0.0 if calibration is None else calibration.doffs
-    d = stored.astype(np.float32)
-    known = (d > max(0.0, -doffs)) & (d <= LARGEST)
-    d[~known] = profile.disparity
-    rest: Singles | np.float32 = np.float32(1)
-    root: Singles | np.float32 = np.float32(1)
-    if camber:
-        across = road.across(columns, rows)
-        side, rest, root = _cambered(d, across, road)
-    foot, rise = profile.at(d * rest)
-    rise *= root
-    gap = foot + columns * np.float32(sine) - (rows * np.float32(cosine) - np.float32(profile.row))
-    if calibration is None:
-        return np.where(known, gap * np.float32(profile.rise) / d, np.float32(np.nan))
-    # |q| of the planes that touch the road, by their rise, 1/m
-    aspect, shifted = calibration.fy / calibration.fx, d + np.float32(doffs)
-    along = calibration.cy * cosine - calibration.cx * sine - profile.row
-    ahead = shifted * rest / rise - foot + np.float32(along)
-    lean: Singles | np.float32 = np.float32(sine**2 + (aspect * cosine) ** 2)
-    if camber:
-        tilt = side / rise * np.float32(camber * road.middle_rise)
-        ahead += tilt * (np.float32(road.across(calibration.cx, calibration.cy)) - across)
-        skew = np.float32(2 * (aspect**2 - 1) * cosine * sine)
-        lean = (tilt * np.float32(cosine**2 + (aspect * sine) ** 2) + skew) * tilt + lean
-    ahead *= np.float32(1 / calibration.fx)
-    length = np.sqrt(ahead * ahead + lean) * np.float32(1 / (calibration.baseline or 1.0))
-    return np.where(known, gap / (length * shifted), np.float32(np.nan))
 
 
 def _cambered(d: Singles, across: Singles, road: FittedRoad) -> tuple[Singles, Singles, Singles]:

@@ -154,15 +154,11 @@ def _colours() -> Pixels:
     return colours
 
 
-# BGR from below the road to above it, evenly spaced, after ColorBrewer's RdBu: its middle, the road, is white
+# blue, green, red from below the road to above it, evenly spaced, after ColorBrewer's RdBu: the road is white
 _BELOW_TO_ABOVE = (
-    (172, 102, 33),
-    (195, 147, 67),
-    (222, 197, 146),
-    (247, 247, 247),
-    (130, 165, 244),
-    (77, 96, 214),
-    (43, 24, 178),
+    (172, 195, 222, 247, 130, 77, 43),
+    (102, 147, 197, 247, 165, 96, 24),
+    (33, 67, 146, 247, 244, 214, 178),
 )
 _NO_DATA = (60, 60, 60)
 _DARKEST = 0.35  # of a colour, where the photo under it is black
@@ -230,7 +226,6 @@ def _ticks(span: tuple[float, float], unit: str) -> list[tuple[float, str]]:
 
 def _height_colours() -> Pixels:
     """Return the BGR of each level, shape (256, 3); level 0 is not used."""
-    places = np.linspace(1, 255, len(_BELOW_TO_ABOVE))
-    ramps = [np.interp(np.arange(256), places, ramp) for ramp in zip(*_BELOW_TO_ABOVE, strict=True)]
-    colours: Pixels = np.rint(np.column_stack(ramps)).astype(np.uint8)
-    return colours
+    places = np.linspace(1, 255, len(_BELOW_TO_ABOVE[0]))
+    ramps = [np.interp(np.arange(256), places, ramp) for ramp in _BELOW_TO_ABOVE]
+    return np.rint(np.column_stack(ramps)).astype(np.uint8)
