@@ -25,8 +25,7 @@ _TINT = 0.5
 _BLOCK = 2**20  # pixels at a time: what they need is large in large maps
 BAR_WIDTH = 64  # of the colour bar, pixels
 _LABEL_EVERY = 50  # pixels along the bar
-_INK = (60, 60, 60)
-_FONT = cv2.FONT_HERSHEY_SIMPLEX
+INK, FONT, FONT_SIZE = (60, 60, 60), cv2.FONT_HERSHEY_SIMPLEX, 0.36
 
 
 def draw_disparity(disparity: NDArray[Any]) -> Pixels:
@@ -125,7 +124,7 @@ def with_bar(picture: Pixels, colours: Pixels, ticks: Iterable[tuple[float, str]
     bar[:, 8:24] = colours[::-1][levels][:, None]
     for place, text in ticks:
         row = min(max(round((1 - place) * (height - 1)) + 4, 9), height - 4)
-        cv2.putText(bar, text, (28, row), _FONT, 0.36, _INK, 1, cv2.LINE_AA)
+        cv2.putText(bar, text, (28, row), FONT, FONT_SIZE, INK, 1, cv2.LINE_AA)
     return np.hstack([picture, bar])
 
 
@@ -189,8 +188,10 @@ def draw_heights(
     ndarray of uint8, shape (H, W + BAR_WIDTH, 3)
         BGR.
     """
-    colours = _height_colours()
     # level 1 is the lowest height, 128 the road, 255 the highest
+    places = np.linspace(1, 255, len(_BELOW_TO_ABOVE[0]))
+    ramps = [np.interp(np.arange(256), places, ramp) for ramp in _BELOW_TO_ABOVE]
+    colours = np.rint(np.column_stack(ramps)).astype(np.uint8)
     levels = np.rint(np.interp(np.nan_to_num(heights), _knots(*span), (1.0, 128.0, 255.0))).astype(np.uint8)
     picture = cv2.applyColorMap(levels, colours.reshape(256, 1, 3))
     known = np.isfinite(heights)
@@ -222,10 +223,3 @@ def _ticks(span: tuple[float, float], unit: str) -> list[tuple[float, str]]:
         (float(np.interp(value, knots, (0.0, 0.5, 1.0))), f"{value:+.4g}" if value else zero)
         for value in (span[0], *values, span[1])
     ]
-
-
-def _height_colours() -> Pixels:
-    """Return the BGR of each level, shape (256, 3); level 0 is not used."""
-    places = np.linspace(1, 255, len(_BELOW_TO_ABOVE[0]))
-    ramps = [np.interp(np.arange(256), places, ramp) for ramp in _BELOW_TO_ABOVE]
-    return np.rint(np.column_stack(ramps)).astype(np.uint8)

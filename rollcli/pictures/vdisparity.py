@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from rollcli.errors import UsageError
 from rollcli.estimator.moments import map_of, strips
 from rollcli.estimator.road.model import Parabola
-from rollcli.pictures.overlay import Pixels, round_step
+from rollcli.pictures.overlay import FONT, FONT_SIZE, INK, Pixels, round_step
 
 _MAX_BINS, _MOST_BINS = 1024, 65535  # unless asked for; and ever, as an image of that width
 _BLOCK = 1 << 22  # pixels counted at a time: a large map would take 40 bytes a pixel
@@ -139,8 +139,6 @@ _DASH = 8
 _SHIFT = 4  # bits of a coordinate after the point
 _ROAD = (255, 255, 0)  # BGR: cyan, which the colours of the counts do not have
 _HORIZON = (120, 220, 120)
-_PAPER, _INK = (255, 255, 255), (60, 60, 60)
-_FONT, _SIZE = cv2.FONT_HERSHEY_SIMPLEX, 0.36
 
 
 def draw_v_disparity(
@@ -208,21 +206,21 @@ def _draw_horizon(chart: Pixels, row: int, unit: int) -> None:
     for start in range(0, chart.shape[1], 2 * dash):
         cv2.line(chart, (start, row), (start + dash - 1, row), _HORIZON, unit)
     place = (4 * unit, max(row - 4 * unit, 10 * unit))
-    cv2.putText(chart, "horizon", place, _FONT, _SIZE * unit, _HORIZON, unit, cv2.LINE_AA)
+    cv2.putText(chart, "horizon", place, FONT, FONT_SIZE * unit, _HORIZON, unit, cv2.LINE_AA)
 
 
 def _with_margins(chart: Pixels, top: float, unit: int) -> Pixels:
     """Return the chart with rows named on its left and disparities below it."""
     height, width = chart.shape[:2]
     left, tick = LEFT_MARGIN * unit, 4 * unit
-    picture = np.full((height + BOTTOM_MARGIN * unit, left + width, 3), _PAPER, np.uint8)
+    picture = np.full((height + BOTTOM_MARGIN * unit, left + width, 3), 255, np.uint8)
     picture[:height, left:] = chart
     for row in _ticks(float(height), float(_LABEL_EVERY[1] * unit)):
-        cv2.line(picture, (left - tick, int(row)), (left - 1, int(row)), _INK, unit)
+        cv2.line(picture, (left - tick, int(row)), (left - 1, int(row)), INK, unit)
         _write(picture, f"{row:g}", left - 7 * unit, max(int(row) + 4 * unit, 9 * unit), unit, align=1.0)
     for disparity in _ticks(top, _LABEL_EVERY[0] * unit * top / width):
         column = left + round(disparity * width / top)
-        cv2.line(picture, (column, height), (column, height + tick - 1), _INK, unit)
+        cv2.line(picture, (column, height), (column, height + tick - 1), INK, unit)
         _write(picture, f"{disparity:g}", column, height + 14 * unit, unit, align=0.5)
     _write(picture, "disparity, px", left + width // 2, height + 27 * unit, unit, align=0.5)
     _write(picture, "row", left - 7 * unit, height + 27 * unit, unit, align=1.0)
@@ -237,6 +235,6 @@ def _ticks(end: float, least_step: float) -> Iterator[float]:
 
 def _write(picture: Pixels, text: str, column: int, row: int, unit: int, *, align: float) -> None:
     """Write a line; `align` 0 starts at the column, 0.5 is centred there, 1 ends there."""
-    (width, _), _ = cv2.getTextSize(text, _FONT, _SIZE * unit, unit)
+    (width, _), _ = cv2.getTextSize(text, FONT, FONT_SIZE * unit, unit)
     left = min(max(column - round(align * width), 0), picture.shape[1] - width)
-    cv2.putText(picture, text, (left, row), _FONT, _SIZE * unit, _INK, unit, cv2.LINE_AA)
+    cv2.putText(picture, text, (left, row), FONT, FONT_SIZE * unit, INK, unit, cv2.LINE_AA)

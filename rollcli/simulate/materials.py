@@ -1,6 +1,6 @@
 """Materials: texture and albedo at coordinates in metres, averaged over the pixel."""
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import lru_cache
 from typing import Any, Protocol
 
@@ -174,10 +174,12 @@ class Material(Protocol):
         """Return the factors of the albedo in blue, green and red: (3,) or (N, 3)."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class _Tinted:
-    """A material of one colour; `offset` shifts its noise, so that no two look alike."""
+    """A material of one colour, with an albedo; `offset` shifts its noise, so that no two look alike."""
 
+    level: float
+    _: KW_ONLY
     tint: Tint = GREY
     offset: float = 0.0
 
@@ -189,7 +191,6 @@ class _Tinted:
 class Plain(_Tinted):
     """One albedo with grain and blotches, and with joints every `joint` metres where that is not 0."""
 
-    level: float
     grain: float = 0.1
     blotch: float = 0.1
     joint: float = 0.0
@@ -206,7 +207,6 @@ class Plain(_Tinted):
 class Leaves(_Tinted):
     """Grass, foliage, far trees: strong blotches of every size; `scale` above 1 makes them finer."""
 
-    level: float
     contrast: float = 0.35
     scale: float = 1.0
 
@@ -244,7 +244,6 @@ class Asphalt(_Tinted):
     `wheels` are the lateral position of one wheel track and the distance between them, metres.
     """
 
-    level: float
     grain: float = 0.16
     wheels: tuple[float, float] = (0.0, 1.8)
     marks: tuple[Mark, ...] = ()
@@ -282,7 +281,6 @@ class Asphalt(_Tinted):
 class Paving(_Tinted):
     """Slabs of a sidewalk with joints between them; each slab has a brightness of its own."""
 
-    level: float
     slab: float
 
     def albedo(self, p: Values, q: Values, w: Values) -> Values:
@@ -298,8 +296,6 @@ class Paving(_Tinted):
 class CarPaint(_Tinted):
     """Body panels: a smooth paint with dark joints, a sill and reflections."""
 
-    level: float
-
     def albedo(self, p: Values, q: Values, w: Values) -> Values:
         sheen = 1 + 0.12 * coarse(p * 3, q * 3, w * 3, self.offset) + 0.03 * fine(p, q, w, self.offset)
         sill = 1 - 0.5 * band(q, 0.0, 0.38, w)
@@ -313,6 +309,6 @@ class Glass(_Tinted):
     """Car windows: dark, with a blurred mirror image and pillars."""
 
     def albedo(self, p: Values, q: Values, w: Values) -> Values:
-        mirror = 0.09 + 0.06 * coarse(p * 5, q * 5, w * 5, self.offset)
+        mirror = self.level + 0.06 * coarse(p * 5, q * 5, w * 5, self.offset)
         pillar = bars(p + 10, 1.1, 0.07, w)
         return np.asarray(np.maximum(mirror * (1 - 0.7 * pillar), 0.01), np.float32)

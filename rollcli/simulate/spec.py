@@ -99,13 +99,12 @@ class FrameSpec(Rendering):
         """The principal point, pixels from the centre of the top-left pixel."""
         return self.principal_point or ((self.size[0] - 1) / 2, (self.size[1] - 1) / 2)
 
-    def cameras(self, normal: Array = LEVEL) -> tuple[Camera, Camera]:
+    def cameras(self, normal: Array = LEVEL) -> list[Camera]:
         """Return the left and the right camera of a rig on the plane through the origin with this normal."""
         axes = rig_axes(self.roll, self.pitch, normal)
         left = self.height * normal
         places = left, left + self.baseline * axes[0]
-        first, second = (Camera(*self.size, self.focal, self.centre, axes, place) for place in places)
-        return first, second
+        return [Camera(*self.size, self.focal, self.centre, axes, place) for place in places]
 
     @property
     def nearest_disparity(self) -> float:

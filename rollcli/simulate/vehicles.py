@@ -53,7 +53,7 @@ def car_materials(offset: float) -> list[Material]:
     paints: list[Material] = [CarPaint(level, tint=tint, offset=offset) for level, tint in _PAINTS]
     return [
         *paints,
-        Glass(tint=(1.05, 1.0, 0.95), offset=offset),
+        Glass(0.09, tint=(1.05, 1.0, 0.95), offset=offset),
         Plain(0.03, 0.3, 0.1),
         Plain(0.45, 0.05, 0.05, tint=(0.15, 0.15, 1.0)),
         Plain(0.7, 0.1, 0.1),
