@@ -121,3 +121,13 @@ class SimulateOptions(Rendering):
     height: Span = (1.65, 1.65)
     grey: bool = False
     resume: bool = False
+
+    @property
+    def scenes(self) -> tuple[str, ...]:
+        """The scenes of which a frame draws one."""
+        return SCENES if self.scene == MIXED else (self.scene,)
+
+    @property
+    def cross_sections(self) -> tuple[str, ...]:
+        """The cross sections of which a frame draws one."""
+        return CROSS_SECTIONS if self.cross_section == MIXED else (self.cross_section,)

@@ -63,21 +63,20 @@ def cross_section(spec: FrameSpec, left: float, right: float, bend: float) -> Cr
         road falls to the right.
     """
     middle, half, crossfall = (left + right) / 2, (right - left) / 2, spec.crossfall
-    start, end = middle - half, middle + half
-    pieces = [Piece(start, end)]
+    pieces = [Piece(left, right)]
     if spec.cross_section == "roof":
-        rising = Piece(start, middle, crossfall, offset=-2 * crossfall * middle)
-        pieces = [rising, Piece(middle, end, -crossfall)]
+        rising = Piece(left, middle, crossfall, offset=-2 * crossfall * middle)
+        pieces = [rising, Piece(middle, right, -crossfall)]
     elif spec.cross_section in ("crown", "dish"):
         camber = (crossfall if spec.cross_section == "dish" else -crossfall) / half
-        pieces = [Piece(start, end, -camber * middle, camber)]
+        pieces = [Piece(left, right, -camber * middle, camber)]
     elif spec.cross_section == "superelevated":
-        pieces = [Piece(start, end, crossfall if bend < 0 else -crossfall)]
+        pieces = [Piece(left, right, crossfall if bend < 0 else -crossfall)]
     if spec.gutter:
-        inner, outer = start + GUTTER_WIDTH, end - GUTTER_WIDTH
+        inner, outer = left + GUTTER_WIDTH, right - GUTTER_WIDTH
         gutters = (
-            _straight(start, inner, inner, pieces[0], spec.gutter),
-            _straight(outer, end, outer, pieces[-1], -spec.gutter),
+            _straight(left, inner, inner, pieces[0], spec.gutter),
+            _straight(outer, right, outer, pieces[-1], -spec.gutter),
         )
         pieces[0] = pieces[0]._replace(start=inner)
         pieces[-1] = pieces[-1]._replace(end=outer)

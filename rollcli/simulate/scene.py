@@ -67,14 +67,9 @@ class Solid:
         flat = np.argmax(np.abs(normal), axis=1)
         first, second = np.array([2, 0, 0])[flat], np.array([1, 2, 1])[flat]
         each = np.arange(points.shape[1])
-        return SurfaceSample(
-            dots(self.frame.T, normal.T),
-            local[first, each],
-            local[second, each],
-            self.frame[first].T,
-            self.frame[second].T,
-            np.array([part.material for part in self.parts])[owner],
-        )
+        (p, grad_p), (q, grad_q) = ((local[axis, each], self.frame[axis].T) for axis in (first, second))
+        material = np.array([part.material for part in self.parts])[owner]
+        return SurfaceSample(dots(self.frame.T, normal.T), p, q, grad_p, grad_q, material)
 
     def bounds(self, margin: float = 0.0) -> Array | None:
         """Return the corners as `Surface.bounds` does, with `margin` metres more on each side."""

@@ -7,17 +7,7 @@ from enum import IntEnum
 import numpy as np
 
 from rollcli.errors import UsageError
-from rollcli.simulate.options import (
-    CROSS_SECTIONS,
-    CROSSFALL,
-    FOCAL_PER_WIDTH,
-    KERB,
-    MIXED,
-    SCENES,
-    Rendering,
-    SimulateOptions,
-    Span,
-)
+from rollcli.simulate.options import CROSSFALL, FOCAL_PER_WIDTH, KERB, Rendering, SimulateOptions, Span
 from rollcli.simulate.relief import Array
 from rollcli.simulate.views import Camera, rig_axes
 
@@ -43,7 +33,7 @@ class FrameSpec(Rendering):
     Parameters
     ----------
     scene : str
-        One of `SCENES`.
+        One of `options.SCENES`.
     roll, pitch : float
         Radians, against the plane that touches the road below the left camera. Positive roll: the rig's
         right end is up. Positive pitch: it looks down at the road.
@@ -51,7 +41,7 @@ class FrameSpec(Rendering):
         Second derivative of the road's height along the driving direction, 1/m; a sag is positive, a
         crest negative.
     cross_section : str
-        One of `CROSS_SECTIONS`.
+        One of `options.CROSS_SECTIONS`.
     crossfall : float
         The steepest slope across the carriageway, metres per metre; 0 when it is flat.
     gutter : float
@@ -146,7 +136,7 @@ def _drawn(spec: FrameSpec, options: SimulateOptions) -> FrameSpec:
     spec = _offset(spec, *(float(rng.uniform(*options.principal_offset)) for _ in range(2)))
     rng = spec.rng(Stream.POSE)
     roll, pitch = (math.radians(rng.uniform(*span)) for span in (options.roll_deg, options.pitch_deg))
-    scene = SCENES[rng.integers(len(SCENES))] if options.scene == MIXED else options.scene
+    scene = options.scenes[rng.integers(len(options.scenes))]
     curvature: float = rng.choice([0.0, 1.0]) * rng.uniform(-0.001, 0.001)
     if options.curvature is not None:
         curvature = rng.uniform(*options.curvature)
@@ -156,9 +146,7 @@ def _drawn(spec: FrameSpec, options: SimulateOptions) -> FrameSpec:
     rng = spec.rng(Stream.CROSS_SECTION)
     spans = options.crossfall or CROSSFALL, options.gutter
     crossfall, gutter = (float(rng.uniform(*span)) / 100 for span in spans)
-    shape = options.cross_section
-    if shape == MIXED:
-        shape = CROSS_SECTIONS[rng.integers(len(CROSS_SECTIONS))]
+    shape = options.cross_sections[rng.integers(len(options.cross_sections))]
     bend = None if options.bend is None else float(rng.uniform(*options.bend))
     crossfall = 0.0 if shape == "flat" else crossfall
     return replace(spec, cross_section=shape, crossfall=crossfall, gutter=gutter, bend=bend)

@@ -122,16 +122,16 @@ class Rays:
         """Return where all of them begin, (3, 1), metres."""
         return self.camera.position[:, None]
 
-    def window(self, corners: Array | None) -> Indices | None:
-        """Return the indices of rays that can hit a box with these corners (3, 8); None: all of them can."""
+    def window(self, corners: Array | None) -> Indices | slice:
+        """Return where the rays are that can hit a box with these corners (3, 8); of no box, all of them."""
         if corners is None:
-            return None
+            return slice(None)
         camera = self.camera
         x, y, depth = camera.axes @ (corners - camera.position[:, None])
         if depth.max() <= 0:
             return np.empty(0, np.intp)
         if depth.min() <= 0.1:
-            return None
+            return slice(None)
         u, v = camera.focal * x / depth + camera.centre[0], camera.focal * y / depth + camera.centre[1]
         across = (self.u >= u.min()) & (self.u <= u.max())
         return np.flatnonzero(across & (self.v >= v.min()) & (self.v <= v.max()))
@@ -161,9 +161,8 @@ def trace(scene: Scene, rays: Rays) -> Hits:
     """Trace the rays, and evaluate the surfaces where they are hit."""
     depth, owner = first_hits(scene, rays)
     hits = Hits(depth, owner, np.full(len(depth), NONE, np.int16), np.ones((8, len(depth)), np.float32))
-    direction = rays.direction.astype(np.float32)
     for k, at in groups(owner, len(scene.surfaces)):
-        _read(scene, scene.surfaces[k], rays, direction.take(at, axis=1), at, hits)
+        _read(scene, scene.surfaces[k], rays, at, hits)
     _dim_below_cars(scene, rays, hits)
     return hits
 
@@ -181,8 +180,7 @@ def first_hits(scene: Scene, rays: Rays) -> tuple[Array, NDArray[np.int16]]:
     depth = np.full(len(rays.u), np.inf)
     owner = np.full(len(rays.u), -1, np.int16)
     for k, surface in enumerate(scene.surfaces):
-        window = rays.window(surface.bounds())
-        at = slice(None) if window is None else window
+        at = rays.window(surface.bounds())
         t = surface.intersect(rays.origin, rays.direction[:, at])
         nearer = t < depth[at]
         depth[at] = np.where(nearer, t, depth[at])
@@ -190,9 +188,9 @@ def first_hits(scene: Scene, rays: Rays) -> tuple[Array, NDArray[np.int16]]:
     return depth, owner
 
 
-def _read(scene: Scene, surface: Surface, rays: Rays, direction: Values, at: Indices, hits: Hits) -> None:
-    """Fill `hits` for the rays `at`, which go in `direction` and hit this surface."""
-    depth = hits.depth[at].astype(np.float32)
+def _read(scene: Scene, surface: Surface, rays: Rays, at: Indices, hits: Hits) -> None:
+    """Fill `hits` for the rays `at`, which hit this surface."""
+    direction, depth = rays.direction.take(at, axis=1).astype(np.float32), hits.depth[at].astype(np.float32)
     points = rays.origin.astype(np.float32) + depth * direction
     sample = surface.sample(points)
     # light the side that faces the camera
@@ -205,8 +203,7 @@ def _read(scene: Scene, surface: Surface, rays: Rays, direction: Values, at: Ind
         sun[lit[in_shadow(points[:, lit], scene.light.sun, casters)]] = 0
     hits.material[at] = sample.material
     footprint = _footprint(sample, direction, depth, rays)
-    found = (sample.p, sample.q, *footprint, sun)
-    for row, values in zip((P, Q, LONG_P, LONG_Q, LONG, SHORT, SUN), found, strict=True):
+    for row, values in enumerate((sample.p, sample.q, *footprint, sun)):  # P to SUN
         hits.reads[row][at] = values
 
 
@@ -214,8 +211,8 @@ def _dim_below_cars(scene: Scene, rays: Rays, hits: Hits) -> None:
     """Reduce the sky's light on the ground near and below cars."""
     ground = np.array([isinstance(s, Ground) for s in scene.surfaces] + [False])[hits.surface]
     for car in scene.cars:
-        window = rays.window(car.bounds(margin=1.0))
-        near = np.flatnonzero(ground) if window is None else window[ground[window]]
+        near = np.arange(len(ground))[rays.window(car.bounds(margin=1.0))]
+        near = near[ground[near]]
         points = rays.origin + hits.depth[near] * rays.direction[:, near]
         hits.reads[AIR][near] *= air_below(points, car)
 
@@ -247,14 +244,14 @@ def _footprint(sample: SurfaceSample, direction: Vectors, depth: Vectors, rays: 
 _MAX_TAPS = 8
 
 
-def shade(scene: Scene, direction: Array, kinds: NDArray[np.int16], reads: Values) -> Values:
-    """Return the light (N, 3) of rays in `direction` (3, N); `kinds` are materials, `reads` as in `Hits`."""
-    light = np.empty((len(kinds), 3), np.float32)
-    nothing = kinds == NONE
-    light[nothing] = sky(scene.light, direction[:, nothing])
+def shade(scene: Scene, rays: Rays, hits: Hits) -> Values:
+    """Return the light (N, 3) that rays bring from what they hit."""
+    light, reads = np.empty((len(hits.material), 3), np.float32), hits.reads
+    nothing = hits.material == NONE
+    light[nothing] = sky(scene.light, rays.direction[:, nothing])
     ambient = np.float32(scene.light.ambient)
     strength = np.float32(scene.light.exposure) * (ambient * reads[AIR] + (1 - ambient) * reads[SUN])
-    for k, at in groups(kinds, len(scene.materials)):
+    for k, at in groups(hits.material, len(scene.materials)):
         material, mine = scene.materials[k], reads[: SHORT + 1].take(at, axis=1)
         bright = _albedo(material, mine) * strength[at]
         light[at] = bright[:, None] * material.colour(mine[P], mine[Q])
@@ -306,19 +303,14 @@ def _render_band(scene: Scene, camera: Camera, rows: slice) -> View:
     v = (rays.v[edge] + _SUBPIXELS[:, 1:]).ravel()
     between = camera.rays(u, v)
     finer = trace(scene, between)
-    light = shade(
-        scene,
-        np.concatenate([rays.direction, between.direction], axis=1),
-        np.concatenate([hits.material, finer.material]),
-        np.concatenate([hits.reads, finer.reads], axis=1),
-    )
-    light[edge] = light[len(rays.u) :].reshape(4, -1, 3).mean(axis=0)
+    light = shade(scene, rays, hits)
+    light[edge] = shade(scene, between, finer).reshape(4, -1, 3).mean(axis=0)
     shape, inner = (len(around), camera.width), slice(rows.start - around.start, rows.stop - around.start)
     return View(
         hits.depth.reshape(shape)[inner],
         hits.surface.reshape(shape)[inner],
         hits.material.reshape(shape)[inner],
-        light[: len(rays.u)].reshape(*shape, 3)[inner],
+        light.reshape(*shape, 3)[inner],
     )
 
 

@@ -8,7 +8,7 @@ from rollcli.simulate.materials import band, bars
 from rollcli.simulate.scene import Light, Post, Scene, in_shadow
 from rollcli.simulate.spec import FrameSpec
 from rollcli.simulate.surfaces import NEAR
-from rollcli.simulate.views import AIR, LONG, LONG_P, LONG_Q, SHORT, SUN, P, Q, shade
+from rollcli.simulate.views import AIR, LONG, LONG_P, LONG_Q, SHORT, SUN, Hits, P, Q, Rays, shade
 
 
 def on_ground(x, z):
@@ -61,7 +61,7 @@ def shaded(material, rows):
         values[row] = value
     light = Light(np.array([0.0, 1.0, 0.0]), ambient=0.3, exposure=1.4, clouds=0.0)
     scene = Scene(light, normal=np.array([0.0, 1.0, 0.0]), materials=[material])
-    return shade(scene, AHEAD, np.zeros(1, np.int16), values)[0]
+    return shade(scene, Rays(None, None, None, AHEAD), Hits(None, None, np.zeros(1, np.int16), values))[0]
 
 
 @pytest.mark.parametrize("ratio", [8, 30])
