@@ -8,10 +8,10 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.simulate.materials import Plain, Values
+from rollcli.simulate.materials import Values
 from rollcli.simulate.relief import LEVEL, Dip
 from rollcli.simulate.road import Carriageway, Piece, Site, cross_section, draw_asphalt, draw_carriageway
-from rollcli.simulate.scene import FAR, Light, Scene, draw, draw_light, draw_offset
+from rollcli.simulate.scene import FAR, Light, Scene, draw, draw_light
 from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Ground, Surface
 from rollcli.simulate.views import Camera, View, expose, render_view
@@ -29,7 +29,16 @@ def build_scene(spec: FrameSpec) -> Scene:
     rng, light, carriageway = _begin(spec)
     scene = Scene(light, normal=carriageway.normal)
     scene.road = scene.material(draw_asphalt(rng, carriageway))
-    _KINDS[spec.scene](Site(scene, rng, carriageway))
+    site = Site(scene, rng, carriageway)
+    beside = site.add_yard() if spec.scene == "street" else site.add_grass()
+    if spec.scene == "bare":
+        _lay_road(site, _HORIZON, beside)
+    else:
+        _lay_road(site, FAR)
+        for side, edge in carriageway.sides:
+            _ROADSIDES[spec.scene](site, side, edge, beside)
+        site.add_cars()
+        site.add_backdrop()
     dips = draw_dips(spec, carriageway)
     scene.surfaces = [_dipped(surface, dips) for surface in scene.surfaces]
     return scene
@@ -52,70 +61,47 @@ def _begin(spec: FrameSpec) -> tuple[np.random.Generator, Light, Carriageway]:
     return rng, draw_light(rng), draw_carriageway(rng, spec)
 
 
-def _bare(site: Site) -> None:
-    """Add the road, and level grass from its edges to the horizon."""
-    grass = site.add_grass()
-    edges, elevation = (site.road.left, site.road.right), site.road.section.elevation
-    left = Piece(-np.inf, edges[0], offset=elevation(edges[0]))
-    right = Piece(edges[1], np.inf, offset=elevation(edges[1]))
-    _lay_road(site, _HORIZON, [(left, grass)], [(right, grass)])
+def _open(site: Site, side: int, edge: float, grass: int) -> None:
+    """Add a kerb, a sidewalk, a lawn and trees on one side of the road."""
+    level, outer = site.add_sidewalk(side, edge)
+    site.add_slope(side, outer, side * np.inf, level, site.draw(-0.04, 0.06), grass)
+    if site.rng.random() < 0.3:
+        site.add_hedge(outer + side * site.draw(0.2, 1.0), level - 0.1)
+    site.add_posts(outer - side * 0.3, level)
+    site.add_trees(outer, outer + side * 25, level - 0.4)
 
 
-def _open(site: Site) -> None:
-    """Add a road with kerbs, sidewalks, lawns, trees and cars."""
-    _lay_road(site)
-    grass = site.add_grass()
-    for side, edge in site.road.sides:
-        level, outer = site.add_sidewalk(side, edge)
-        site.add_slope(side, outer, side * np.inf, level, site.draw(-0.04, 0.06), grass)
-        if site.rng.random() < 0.3:
-            site.add_hedge(outer + side * site.draw(0.2, 1.0), level - 0.1)
-        site.add_posts(outer - side * 0.3, level)
-        site.add_trees(outer, outer + side * 25, level - 0.4)
-    site.add_cars()
-    site.add_backdrop()
+def _street(site: Site, side: int, edge: float, yard: int) -> None:
+    """Add a kerb, a sidewalk and house fronts on one side of the road."""
+    level, outer = site.add_sidewalk(side, edge, beyond=yard)
+    garden = float(site.rng.choice([0.0, 1.0])) * site.draw(1, 6)
+    site.add_houses(side, outer + side * garden, level)
+    site.add_posts(edge + side * 0.5, level)
+    if site.rng.random() < 0.35:
+        site.add_trees(edge + side * 0.8, edge + side * 0.9, level)
 
 
-def _street(site: Site) -> None:
-    """Add a street between house fronts."""
-    _lay_road(site)
-    yard = site.scene.material(Plain(0.3, tint=(0.9, 0.97, 1.0), offset=draw_offset(site.rng)))
-    for side, edge in site.road.sides:
-        level, outer = site.add_sidewalk(side, edge, beyond=yard)
-        garden = float(site.rng.choice([0.0, 1.0])) * site.draw(1, 6)
-        site.add_houses(side, outer + side * garden, level)
-        site.add_posts(edge + side * 0.5, level)
-        if site.rng.random() < 0.35:
-            site.add_trees(edge + side * 0.8, edge + side * 0.9, level)
-    site.add_cars()
-    site.add_backdrop()
+def _verge(site: Site, side: int, edge: float, grass: int) -> None:
+    """Add a grass slope that is wider than the road on one side of it."""
+    level = site.road.section.elevation(edge)
+    slope = float(site.rng.choice([-1.0, 1.0])) * site.draw(0.03, 0.3)
+    width = (site.road.right - site.road.left) * site.draw(1.2, 3)
+    foot = edge + side * width
+    site.add_slope(side, edge, foot, level, slope, grass)
+    site.add_slope(side, foot, side * np.inf, level + slope * width, 0.0, grass)
+    site.add_posts(edge + side * 0.6, level + 0.6 * slope, radius=0.05, height=1.0)
+    if slope < 0.1:
+        site.add_trees(foot, foot + side * 30, level + slope * width)
 
 
-def _verge(site: Site) -> None:
-    """Add a country road between grass slopes that are wider than the road."""
-    _lay_road(site)
-    grass = site.add_grass()
-    for side, edge in site.road.sides:
-        level = site.road.section.elevation(edge)
-        slope = float(site.rng.choice([-1.0, 1.0])) * site.draw(0.03, 0.3)
-        width = (site.road.right - site.road.left) * site.draw(1.2, 3)
-        foot = edge + side * width
-        site.add_slope(side, edge, foot, level, slope, grass)
-        site.add_slope(side, foot, side * np.inf, level + slope * width, 0.0, grass)
-        site.add_posts(edge + side * 0.6, level + 0.6 * slope, radius=0.05, height=1.0)
-        if slope < 0.1:
-            site.add_trees(foot, foot + side * 30, level + slope * width)
-    site.add_cars()
-    site.add_backdrop()
-
-
-Strips = Sequence[tuple[Piece, int]]
-
-
-def _lay_road(site: Site, far: float = FAR, left: Strips = (), right: Strips = ()) -> None:
-    """Add the ground of the road's pieces, and of those beside it with their materials, up to `far` ahead."""
-    road = site.road
-    strips = [*left, *((piece, site.scene.road) for piece in road.section.pieces), *right]
+def _lay_road(site: Site, far: float, beside: int | None = None) -> None:
+    """Add the ground of the road up to `far` ahead; and level ground of a material beside it."""
+    road, elevation = site.road, site.road.section.elevation
+    strips = [(piece, site.scene.road) for piece in road.section.pieces]
+    if beside is not None:
+        left = Piece(-np.inf, road.left, offset=elevation(road.left))
+        right = Piece(road.right, np.inf, offset=elevation(road.right))
+        strips = [(left, beside), *strips, (right, beside)]
     # pieces of one parabola are one ground
     for (slope, camber, offset), group in groupby(strips, key=lambda strip: strip[0][2:]):
         pieces, materials = zip(*group, strict=True)
@@ -124,7 +110,7 @@ def _lay_road(site: Site, far: float = FAR, left: Strips = (), right: Strips = (
         site.scene.surfaces.append(ground)
 
 
-_KINDS = {"bare": _bare, "open": _open, "street": _street, "verge": _verge}
+_ROADSIDES = {"open": _open, "street": _street, "verge": _verge}
 
 
 def draw_dips(spec: FrameSpec, carriageway: Carriageway) -> tuple[Dip, ...]:

@@ -199,6 +199,10 @@ class Site:
         look = Leaves(self.draw(0.14, 0.24), self.draw(0.15, 0.3), tint=_GRASS, offset=draw_offset(self.rng))
         return self.scene.material(look)
 
+    def add_yard(self) -> int:
+        """Add the material of the ground between sidewalks and houses; return its index."""
+        return self.scene.material(Plain(0.3, tint=(0.9, 0.97, 1.0), offset=draw_offset(self.rng)))
+
     def add_leaves(self, low: float, high: float, tint: Tint, contrast: float, scale: float = 1.0) -> int:
         """Add the material of foliage of an albedo between two; return its index."""
         look = Leaves(self.draw(low, high), contrast, scale, tint=tint, offset=draw_offset(self.rng))
