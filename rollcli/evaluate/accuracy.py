@@ -210,8 +210,8 @@ def assess_heights(
             continue
         if all(stem in folder for folder in folders):
             compared = True
-            estimated, true, disparity = (folder[stem] for folder in folders)
-            for distance, found in _height_errors(estimated, true, disparity, rig.focal_baseline):
+            maps = [folder[stem] for folder in folders]
+            for distance, found in _height_errors(maps, rig.focal_baseline):
                 errors[distance].append(found[:: -(-len(found) // _MOST)])
                 worst[distance] = max(worst[distance], float(np.abs(found).max()))
     if not compared:
@@ -223,16 +223,18 @@ def assess_heights(
     }
 
 
-def _height_errors(
-    estimated: str, true: str, disparities: str, scale: float
-) -> Iterator[tuple[int, NDArray[np.float64]]]:
-    """Yield the errors of a frame at each distance; `scale` is its focal length times its baseline, px m."""
-    heights, truth = (read_stored(path).values.astype(np.float64) for path in (estimated, true))
-    disparity = read_disparity(disparities)
+def _height_errors(maps: Sequence[str], scale: float) -> Iterator[tuple[int, NDArray[np.float64]]]:
+    """Yield the errors of a frame at each distance.
+
+    `maps` are its heights, the true ones and the true disparity; `scale` is its focal length times its
+    baseline, px m.
+    """
+    heights, truth = (read_stored(path).values.astype(np.float64) for path in maps[:2])
+    disparity = read_disparity(maps[2])
     if not heights.shape == truth.shape == disparity.shape:
         shapes = (heights.shape, truth.shape, disparity.shape)
         sizes = ", ".join(f"{width}x{height}" for height, width in shapes)
-        raise InputError(f"{estimated}: heights, true heights and true disparity differ in size: {sizes}")
+        raise InputError(f"{maps[0]}: heights, true heights and true disparity differ in size: {sizes}")
     off = heights - truth
     with np.errstate(divide="ignore"):
         ahead = scale / disparity

@@ -133,8 +133,8 @@ def v_disparity_figure(
         curves = [profile(alpha, theta, width), (a0 + a1 * start + a2 * start**2, a1 + 2 * a2 * start, a2)]
     counted = [v_disparity(each, bins=bins, max_disparity=max_disparity) for each in maps]
     with drawing_style(PRINT):
-        size = (COLUMN, 2 * _MAP_WIDTH * height / width + _AROUND)
-        figure = Figure((size[0] / 72, size[1] / 72), layout="constrained")
+        tall = 2 * _MAP_WIDTH * height / width + _AROUND
+        figure = Figure((COLUMN / 72, tall / 72), layout="constrained")
         axes = figure.subplots(2, 2, width_ratios=(_MAP_SHARE, 1.0), sharey=True, squeeze=False)
         for row, (left, right) in enumerate(axes):
             picture = _draw_map(left, maps[row], titles[row])
@@ -147,8 +147,7 @@ def v_disparity_figure(
         figure.colorbar(
             picture, ax=axes[1, 0], location="bottom", label="disparity, px", aspect=30, extend="max"
         ).outline.set_visible(False)
-        what = "Disparity map and v-disparity, as they are and de-rotated"
-        return figure_file(figure, kind, what)
+        return figure_file(figure, kind, "Disparity map and v-disparity, as they are and de-rotated")
 
 
 def _draw_map(axes: Axes, disparity: NDArray[Any], title: str) -> Any:

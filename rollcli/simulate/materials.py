@@ -1,5 +1,6 @@
 """Materials: texture and albedo at coordinates in metres, averaged over the pixel."""
 
+from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import lru_cache
 from typing import Any, Protocol
@@ -9,7 +10,8 @@ from numpy.typing import NDArray
 
 Values = NDArray[np.float32]
 
-_SIDE = 512  # texels of a tile, a power of two: wrapping is a bit mask
+_BITS = 9
+_SIDE = 1 << _BITS  # texels of a tile, a power of two: wrapping is a bit mask
 
 
 class NoiseTile:
@@ -37,19 +39,15 @@ class NoiseTile:
             levels.append(level.astype(np.float32).ravel())
             level = level.reshape(level.shape[0] // 2, 2, -1, 2).mean(axis=(1, 3))
         self._table, self._texel = np.concatenate(levels), texel
-        sides = _SIDE >> np.arange(len(levels))
-        self._starts = np.concatenate([[0], np.cumsum(sides**2)[:-1]]).astype(np.int32)
-        self._bits = np.log2(sides).astype(np.int32)
-        self._scales = (sides / _SIDE).astype(np.float32)
-        self._masks = (sides - 1).astype(np.int32)
+        self._starts = np.cumsum([0, *(each.size for each in levels)], dtype=np.int32)[:-1]
 
     def sample(self, x: Values, y: Values, w: Values) -> Values:
         """Return the noise at (x, y) metres averaged over about `w` metres; bilinear."""
         # rint(log2(w / texel)) from the exponent bits of a float32, which is several times faster
         level = ((w * np.float32(np.sqrt(2) / self._texel)).view(np.int32) >> 23) - np.int32(127)
         level = np.minimum(np.maximum(level, 0), len(self._starts) - 1)
-        start, bits, mask = (table[level] for table in (self._starts, self._bits, self._masks))
-        scale = self._scales[level]
+        start, bits = self._starts[level], np.int32(_BITS) - level
+        mask, scale = (np.int32(1) << bits) - np.int32(1), np.ldexp(np.float32(1), -level)
         x, y = (each * np.float32(1 / self._texel) * scale - np.float32(0.5) for each in (x, y))
         floor_x, floor_y = np.floor(x), np.floor(y)
         wx, wy = x - floor_x, y - floor_y
@@ -246,9 +244,9 @@ class Asphalt(_Tinted):
 
     grain: float = 0.16
     wheels: tuple[float, float] = (0.0, 1.8)
-    marks: tuple[Mark, ...] = ()
-    patches: tuple[Patch, ...] = ()
-    seams: tuple[float, ...] = ()
+    marks: Sequence[Mark] = ()
+    patches: Sequence[Patch] = ()
+    seams: Sequence[float] = ()
 
     def albedo(self, p: Values, q: Values, w: Values) -> Values:
         grain, blotch = fine(p, q, w, self.offset), coarse(p, q, w, self.offset)

@@ -59,11 +59,8 @@ class Dip:
         out = np.hypot(x, y)
         fall = np.clip((out - _FLOOR) / (1 - _FLOOR), 0, 1)
         by_out = -np.pi / 2 / (1 - _FLOOR) * np.sin(np.pi * fall) * self.height / np.maximum(out, _FLOOR)
-        return (
-            self.height * (0.5 + 0.5 * np.cos(np.pi * fall)),
-            by_out * x / self.across,
-            by_out * y / self.along,
-        )
+        height = self.height * (0.5 + 0.5 * np.cos(np.pi * fall))
+        return height, by_out * x / self.across, by_out * y / self.along
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +97,7 @@ class Relief:
 
     def height(self, lateral: Vectors, z: Vectors) -> Vectors:
         """Return the heights (N,) at positions (N,), metres."""
-        (near, right_near), (far, right_far), across, along = self._corners(lateral, z)
+        near, right_near, far, right_far, across, along = self._corners(lateral, z)
         first, last = near + across * (right_near - near), far + across * (right_far - far)
         return np.asarray(
             sum((dip.relief(lateral, z)[0] for dip in self.dips), first + along * (last - first))
@@ -108,7 +105,7 @@ class Relief:
 
     def slopes(self, lateral: Vectors, z: Vectors) -> tuple[Vectors, Vectors]:
         """Return the slopes (N,) to the right and ahead at positions (N,), metres per metre."""
-        (near, right_near), (far, right_far), across, along = self._corners(lateral, z)
+        near, right_near, far, right_far, across, along = self._corners(lateral, z)
         right = ((right_near - near) * (1 - along) + (right_far - far) * along) / STEP
         ahead = ((far - near) * (1 - across) + (right_far - right_near) * across) / STEP
         for dip in self.dips:
@@ -116,18 +113,15 @@ class Relief:
             right, ahead = right + by_lateral, ahead + by_z
         return right, ahead
 
-    def _corners(
-        self, lateral: Vectors, z: Vectors
-    ) -> tuple[tuple[Vectors, Vectors], tuple[Vectors, Vectors], Vectors, Vectors]:
-        """Return the heights around positions, near and far, left and right, and where these lie between."""
+    def _corners(self, lateral: Vectors, z: Vectors) -> tuple[Vectors, ...]:
+        """Return the heights around positions, two near and two far ones, and where these lie between."""
         rows, columns = self.heights.shape
         across = np.clip((lateral - LEFT) / STEP, 0, columns - 1.001)
         along = np.clip((z - _START) / STEP, 0, rows - 1.001)
         column, row = across.astype(np.intp), along.astype(np.intp)
         node, flat = row * columns + column, self.heights.ravel()
-        near = flat.take(node), flat.take(node + 1)
-        far = flat.take(node + columns), flat.take(node + columns + 1)
-        return near, far, across - column, along - row
+        corners = (flat.take(node + more) for more in (0, 1, columns, columns + 1))
+        return *corners, across - column, along - row
 
 
 LEVEL = Relief(np.zeros((2, 2)))

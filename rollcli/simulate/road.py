@@ -167,15 +167,10 @@ def draw_asphalt(rng: np.random.Generator, carriageway: Carriageway) -> Asphalt:
         x, z = draw(rng, carriageway.left, carriageway.right), draw(rng, 3, 40)
         wide, long = draw(rng, 0.5, 2.0), draw(rng, 0.8, 6.0)
         patches.append(Patch(x, x + wide, z, z + long, draw(rng, -0.35, 0.2)))
-    return Asphalt(
-        draw(rng, 0.16, 0.30),
-        draw(rng, 0.04, 0.2),
-        wheels=(carriageway.shift + 0.25 * carriageway.lane, carriageway.lane / 2),
-        marks=tuple(marks),
-        patches=tuple(patches),
-        seams=tuple(draw(rng, carriageway.left, carriageway.right) for _ in range(rng.integers(1, 4))),
-        offset=draw_offset(rng),
-    )
+    level, grain = draw(rng, 0.16, 0.30), draw(rng, 0.04, 0.2)
+    seams = [draw(rng, carriageway.left, carriageway.right) for _ in range(rng.integers(1, 4))]
+    wheels = carriageway.shift + 0.25 * carriageway.lane, carriageway.lane / 2
+    return Asphalt(level, grain, wheels, marks, patches, seams, offset=draw_offset(rng))
 
 
 _GRASS: Tint = (0.45, 1.0, 0.72)

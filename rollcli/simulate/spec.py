@@ -122,10 +122,12 @@ def draw_specs(options: SimulateOptions) -> list[FrameSpec]:
         colour=not options.grey,
         kerb=options.kerb or KERB,
     )
-    for end in (0, 1):  # what is not possible is refused, whatever would be drawn
-        roll, pitch = math.radians(options.roll_deg[end]), math.radians(options.pitch_deg[end])
-        offset = options.principal_offset[end]
-        _offset(replace(rig, roll=roll, pitch=pitch, height=options.height[0]), offset, offset)
+    # what is not possible is refused, whatever would be drawn
+    for roll, pitch, offset in zip(
+        options.roll_deg, options.pitch_deg, options.principal_offset, strict=True
+    ):
+        lowest = replace(rig, roll=math.radians(roll), pitch=math.radians(pitch), height=options.height[0])
+        _offset(lowest, offset, offset)
     return [_drawn(replace(rig, index=index), options) for index in range(options.frames)]
 
 
