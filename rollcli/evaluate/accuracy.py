@@ -117,7 +117,7 @@ def assess(
     UsageError
         No row matches a known angle, or two rows have the same stem.
     """
-    places = by_stem((row.file for row in rows), result_name)
+    places = by_stem([row.file for row in rows], result_name)
     if not places.keys() & truth.keys():
         example = f": it holds {rows[0].file}, the truth {next(iter(truth))}" if rows else ": it is empty"
         raise UsageError(f"{result_name}: no row has the stem of a frame of the truth{example}")
@@ -346,8 +346,7 @@ def run_accuracy(options: AccuracyOptions) -> ExitStatus:
     if listed_only([result, truth], writes, running):
         return ExitStatus.DONE
     read, known = read_result(result), read_truth(truth)
-    found = assess(read.rows, known, result)
-    found = replace(found, heights=_heights(read, known, options))
+    found = replace(assess(read.rows, known, result), heights=_heights(read, known, options))
     if not running.quiet:
         _name_unmatched(found, options)
         _count_bent(read.rows, known, truth)

@@ -60,7 +60,6 @@ def rotate_nearest(disparity: NDArray[Any], angle: float) -> NDArray[Any]:
 DELTAS = tuple(math.pi / k for k in (1.8e3, 1.8e4, 1.8e5, 1.8e6))
 LAMBDAS = tuple(float(rate) for rate in range(1, 101))
 METHODS = ("gd", "line", "plane", "areas", "auto")
-_LARGEST_ROLL = math.radians(MAX_ROLL_LIMIT_DEG)
 
 
 @dataclass(frozen=True)
@@ -182,7 +181,7 @@ def _sweep(energy: Energy) -> tuple[tuple[int | None, ...], ...]:
 def _methods(largest_turn: float, chosen: bool) -> dict[str, Callable[[NDArray[Any]], float]]:
     """Return each method as a function from a map to its angle."""
     further = max(0.0, largest_turn - math.radians(20))
-    request = Request(max_roll=min(_LARGEST_ROLL, Request.max_roll + further))
+    request = Request(max_roll=min(math.radians(MAX_ROLL_LIMIT_DEG), Request.max_roll + further))
 
     def by_areas(name: str, disparity: NDArray[Any]) -> float:
         checked = CheckedMap.of(disparity, None)
@@ -252,10 +251,10 @@ class Textbook:
         """Shrink a bracket of one period until it is narrower than `tolerance`, radians."""
         return shrink_bracket(self.energy, tolerance)
 
-    def gradient_descent(self, tolerance: float, lambda0: float) -> Solution:
+    def gradient_descent(self, tolerance: float) -> Solution:
         """Descend from 0 by [GD eq. 11 and 14], unguarded, until a step is shorter than `tolerance`."""
         unit = 1 / (2 * len(self.d) * float(self.d.max()) ** 2)
-        theta, rate, slope = 0.0, lambda0, unit * self.gradient(0.0)
+        theta, rate, slope = 0.0, LAMBDA0, unit * self.gradient(0.0)
         for iteration in range(1, _MAX_ITERATIONS + 1):
             step = -rate * slope
             theta += step
@@ -305,13 +304,12 @@ def time_solvers(disparity: NDArray[Any]) -> Times:
         return solve(Energy.of(map_moments(disparity), peak), Request(tolerance=delta))
 
     seconds: dict[tuple[str, str], tuple[float, ...]] = {}
-    descend: Callable[[float], Solution] = partial(textbook.gradient_descent, lambda0=LAMBDA0)
-    solvers = {"gss": (golden_section, textbook.golden_section), "gd": (gradient_descent, descend)}
-    for name, (solve, written_out) in solvers.items():
+    written = {"gss": textbook.golden_section, "gd": textbook.gradient_descent}
+    for name, solve in {"gss": golden_section, "gd": gradient_descent}.items():
         seconds[name, "moments"] = timed(partial(alone, solve), 50)
         seconds[name, "with_pass"] = timed(partial(with_pass, solve), 10)
         with np.errstate(all="ignore"):  # unguarded, it may run away
-            seconds[name, "textbook"] = timed(written_out, 2)
+            seconds[name, "textbook"] = timed(written[name], 2)
     return Times(len(textbook.d), seconds)
 
 

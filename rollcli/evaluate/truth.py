@@ -3,7 +3,7 @@
 import csv
 import io
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,7 +32,7 @@ class KnownPose:
     focal_baseline: float | None = None
 
 
-def by_stem(names: Iterable[str], where: str) -> dict[str, int]:
+def by_stem(names: Sequence[str], where: str) -> dict[str, int]:
     """Return the place of each name by its stem.
 
     Raises
@@ -41,12 +41,11 @@ def by_stem(names: Iterable[str], where: str) -> dict[str, int]:
         Names two that have the same stem; `where` says where they are.
     """
     places: dict[str, int] = {}
-    listed = list(names)
-    for place, name in enumerate(listed):
+    for place, name in enumerate(names):
         first = places.setdefault(stem_of(name), place)
         if first != place:
             raise UsageError(
-                f"{where}: {listed[first]} and {name} have the same stem, and frames are matched by it: "
+                f"{where}: {names[first]} and {name} have the same stem, and frames are matched by it: "
                 "evaluate their folders apart"
             )
     return places
@@ -77,7 +76,7 @@ def read_truth(path: str | Path) -> dict[str, KnownPose]:
     rows = list(_rows(as_utf8(read_named(path), str(path)).decode(**TEXT), path))
     if not rows:
         raise InputError(f"{path}: holds no angle")
-    places = by_stem((name for name, _ in rows), str(path))
+    places = by_stem([name for name, _ in rows], str(path))
     return {stem: rows[place][1] for stem, place in places.items()}
 
 

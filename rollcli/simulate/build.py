@@ -64,7 +64,7 @@ def _begin(spec: FrameSpec) -> tuple[np.random.Generator, Light, Carriageway]:
 def _open(site: Site, side: int, edge: float, grass: int) -> None:
     """Add a kerb, a sidewalk, a lawn and trees on one side of the road."""
     level, outer = site.add_sidewalk(side, edge)
-    site.add_slope(side, outer, side * np.inf, level, site.draw(-0.04, 0.06), grass)
+    site.add_slope(outer, side * np.inf, level, site.draw(-0.04, 0.06), grass)
     if site.rng.random() < 0.3:
         site.add_hedge(outer + side * site.draw(0.2, 1.0), level - 0.1)
     site.add_posts(outer - side * 0.3, level)
@@ -87,8 +87,8 @@ def _verge(site: Site, side: int, edge: float, grass: int) -> None:
     slope = float(site.rng.choice([-1.0, 1.0])) * site.draw(0.03, 0.3)
     width = (site.road.right - site.road.left) * site.draw(1.2, 3)
     foot = edge + side * width
-    site.add_slope(side, edge, foot, level, slope, grass)
-    site.add_slope(side, foot, side * np.inf, level + slope * width, 0.0, grass)
+    site.add_slope(edge, foot, level, slope, grass)
+    site.add_slope(foot, side * np.inf, level + slope * width, 0.0, grass)
     site.add_posts(edge + side * 0.6, level + 0.6 * slope, radius=0.05, height=1.0)
     if slope < 0.1:
         site.add_trees(foot, foot + side * 30, level + slope * width)

@@ -203,16 +203,11 @@ class Site:
         look = Leaves(self.draw(low, high), contrast, scale, tint=tint, offset=draw_offset(self.rng))
         return self.scene.material(look)
 
-    def add_slope(
-        self, side: int, start: float, end: float, level: float, slope: float, material: int
-    ) -> None:
+    def add_slope(self, start: float, end: float, level: float, slope: float, material: int) -> None:
         """Add ground from `start` outward to `end`: from elevation `level` on with an outward `slope`."""
-        signed = side * slope
-        edges = (start, end) if side > 0 else (end, start)
-        shape = (signed, level - signed * start)
-        self.scene.surfaces.append(
-            Ground(self.road.course, edges, (material,), FAR, *shape, relief=self.road.relief)
-        )
+        right, edges = (slope, (start, end)) if end > start else (-slope, (end, start))
+        course, relief, offset = self.road.course, self.road.relief, level - right * start
+        self.scene.surfaces.append(Ground(course, edges, (material,), FAR, right, offset, relief=relief))
 
     def add_sidewalk(self, side: int, edge: float, beyond: int | None = None) -> tuple[float, float]:
         """Add a kerb, a sidewalk and, of the material `beyond`, level ground behind it.
@@ -272,10 +267,8 @@ class Site:
         """Add lamp posts or delineators, evenly spaced."""
         metal = self.scene.material(Plain(self.draw(0.2, 0.6), 0.05, 0.05))
         gap = self.draw(18, 35)
-        feet = [
-            self.road.course.point(lateral, z, level) for z in np.arange(self.draw(6, gap), 90, gap).tolist()
-        ]
-        self.scene.surfaces += [Post(foot, radius, height, metal) for foot in feet]
+        for z in np.arange(self.draw(6, gap), 90, gap).tolist():
+            self.scene.surfaces.append(Post(self.road.course.point(lateral, z, level), radius, height, metal))
 
     def add_trees(self, near: float, outer: float, level: float) -> None:
         """Add trees between two lateral positions, each a trunk and two crowns that overlap."""

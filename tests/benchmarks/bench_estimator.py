@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from rollcli.estimator.energy import Energy
 from rollcli.estimator.moments import map_moments
-from rollcli.estimator.request import DEFAULT_REQUEST, LAMBDA0
+from rollcli.estimator.request import DEFAULT_REQUEST
 from rollcli.estimator.solvers.areas import iterative
 from rollcli.estimator.solvers.exact import exact
 from rollcli.estimator.solvers.golden_section import golden_section
@@ -60,7 +60,7 @@ def measure(width: int, height: int) -> dict[str, float]:
         "areas, with its pass": best(lambda: iterative(disparity, disparity > 0)),
         "n x 3: E": best(lambda: textbook.energy(0.1)),
         "n x 3: gradient": best(lambda: textbook.gradient(0.1)),
-        "n x 3: gd": best(lambda: textbook.gradient_descent(DEFAULT_REQUEST.tolerance, LAMBDA0)),
+        "n x 3: gd": best(lambda: textbook.gradient_descent(DEFAULT_REQUEST.tolerance)),
         "n x 3: gss": best(lambda: textbook.golden_section(DEFAULT_REQUEST.tolerance)),
     }
     figures["moments / np.sum"] = figures["moments of the map"] / figures["np.sum of the map"]

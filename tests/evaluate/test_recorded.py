@@ -65,8 +65,7 @@ def _tables():
 def _textbook():
     textbook = Textbook(bent_road(5, width=40, height=30, noise=0.3, seed=4))
     return [
-        [textbook.golden_section(delta), textbook.gradient_descent(delta, lambda0=26.0)]
-        for delta in (1e-2, 1e-4, 1e-6)
+        [textbook.golden_section(delta), textbook.gradient_descent(delta)] for delta in (1e-2, 1e-4, 1e-6)
     ]
 
 

@@ -69,7 +69,7 @@ def test_equal_gradients_end_it():
 def test_it_takes_the_path_of_the_papers_equations(roll_deg):
     disparity = bent_road(roll_deg, width=150, height=100, noise=0.5)
     ours = gradient_descent(energy_of(disparity), Request(tolerance=1.7e-6))
-    papers = Textbook(disparity).gradient_descent(1.7e-6, 26.0)
+    papers = Textbook(disparity).gradient_descent(1.7e-6)
     assert ours.iterations == papers.iterations
     assert degrees_apart(ours.theta, papers.theta) < 1e-6
 
