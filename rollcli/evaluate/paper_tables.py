@@ -1,7 +1,7 @@
 """The paper's tables and figures as tables of numbers, each one CSV."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -46,29 +46,26 @@ def column(table: Table, name: str, **of: Value) -> list[Any]:
     return [row[name] for row in table if of.items() <= row.items()]
 
 
-def maps_table(found: Sequence[Findings], failed: Sequence[Row]) -> Table:
-    """Return each map: its angle, and the iterations on it; of one that failed the reason."""
-    table = Table()
+def maps_table(found: Sequence[Findings], failed: Sequence[Row]) -> Iterator[Line]:
+    """Yield each map: its angle, and the iterations on it; of one that failed the reason."""
     for each in found:
-        row = {name: getattr(each, name) for name in ("file", "width", "height", "pixels")}
+        row: Line = {name: getattr(each, name) for name in ("file", "width", "height", "pixels")}
         row["theta_deg"] = math.degrees(each.theta)
         for solver in PAPER_ITERATIONS:
             name = SOLVER_NAMES[solver].replace(" ", "_")
             row |= zip((f"{name}_{delta:g}" for delta in DELTAS_DEG), getattr(each, solver), strict=True)
-        table.append({**row, "message": ""})
-    nothing = dict.fromkeys(table[0])
-    return table + [{**nothing, "file": row.file, "message": row.message} for row in failed]
+        row["message"] = ""
+        yield row
+    for lost in failed:
+        yield {**dict.fromkeys(row), "file": lost.file, "message": lost.message}
 
 
-def iterations_table(found: Sequence[Findings]) -> Table:
-    """Return Table I: iterations of both solvers for each delta."""
-    table = Table()
+def iterations_table(found: Sequence[Findings]) -> Iterator[Line]:
+    """Yield Table I: iterations of both solvers for each delta."""
     for solver, papers in PAPER_ITERATIONS.items():
         for k, delta in enumerate(DELTAS):
-            counts = [getattr(each, solver)[k] for each in found]
             row: Line = {"solver": solver, "delta_deg": DELTAS_DEG[k], "delta_rad": delta, "paper": papers[k]}
-            table.append({**row, **_spread(counts)})
-    return table
+            yield {**row, **_spread([getattr(each, solver)[k] for each in found])}
 
 
 def _spread(counts: Sequence[int]) -> Line:
@@ -76,9 +73,8 @@ def _spread(counts: Sequence[int]) -> Line:
     return dict(zip(("mean", "min", "max", "maps"), (*known, len(counts)), strict=True))
 
 
-def runtime_table(times: Sequence[Times]) -> Table:
-    """Return Table II: mean run time of both solvers in three forms, seconds."""
-    table = Table()
+def runtime_table(times: Sequence[Times]) -> Iterator[Line]:
+    """Yield Table II: mean run time of both solvers in three forms, seconds."""
     for solver, papers in PAPER_SECONDS.items():
         for k, paper in enumerate(papers):
             row: Line = {"solver": solver, "delta_deg": DELTAS_DEG[k], "paper_s": paper}
@@ -87,42 +83,35 @@ def runtime_table(times: Sequence[Times]) -> Table:
                 for form in FORMS
             }
             ratio = means["textbook_s"] / means["moments_s"]
-            table.append({**row, **means, "textbook_over_moments": ratio, "maps": len(times)})
-    return table
+            yield {**row, **means, "textbook_over_moments": ratio, "maps": len(times)}
 
 
-def sweep_table(found: Sequence[Findings]) -> Table:
-    """Return Fig. 3: iterations of gd against the first learning rate, for each delta.
+def sweep_table(found: Sequence[Findings]) -> Iterator[Line]:
+    """Yield Fig. 3: iterations of gd against the first learning rate, for each delta.
 
     Over the maps on which it ended within delta of a minimum; `short` counts the others.
     """
-    table = Table()
     for d, delta_deg in enumerate(DELTAS_DEG):
         for k, rate in enumerate(LAMBDAS):
             counts = [count for each in found if (count := each.sweep[d][k]) is not None]
             row = {"lambda0": rate, "delta_deg": delta_deg, **_spread(counts)}
-            table.append({**row, "short": len(found) - len(counts)})
-    return table
+            yield {**row, "short": len(found) - len(counts)}
 
 
-def solvers_table(found: Sequence[Findings]) -> Table:
-    """Return Fig. 6: errors of the three solvers after known rotations, for each delta."""
-    table = Table()
+def solvers_table(found: Sequence[Findings]) -> Iterator[Line]:
+    """Yield Fig. 6: errors of the three solvers after known rotations, for each delta."""
     for solver in SOLVERS:
         for k, delta_deg in enumerate(DELTAS_DEG):
             errors = [turn[k] for each in found for turn in each.solver_errors[solver]]
-            table.append({"solver": solver, "delta_deg": delta_deg, **_errors(errors)})
-    return table
+            yield {"solver": solver, "delta_deg": delta_deg, **_errors(errors)}
 
 
-def methods_table(found: Sequence[Findings]) -> Table:
-    """Return the errors of our other methods after the same rotations."""
-    table = Table()
+def methods_table(found: Sequence[Findings]) -> Iterator[Line]:
+    """Yield the errors of our other methods after the same rotations."""
     for method in METHODS:
         errors = [error for each in found for error in each.method_errors[method]]
         known = [error for error in errors if error is not None]
-        table.append({"method": method, **_errors(known), "no_angle": len(errors) - len(known)})
-    return table
+        yield {"method": method, **_errors(known), "no_angle": len(errors) - len(known)}
 
 
 def _errors(errors: Sequence[float]) -> Line:
@@ -137,7 +126,7 @@ def _errors(errors: Sequence[float]) -> Line:
 
 def all_tables(found: Sequence[Findings], failed: Sequence[Row], times: Sequence[Times]) -> dict[str, Table]:
     """Return every table by the name of its file, without the ending."""
-    return {
+    tables = {
         "maps": maps_table(found, failed),
         "table1_iterations": iterations_table(found),
         "table2_runtime": runtime_table(times),
@@ -145,3 +134,4 @@ def all_tables(found: Sequence[Findings], failed: Sequence[Row], times: Sequence
         "fig6_accuracy": solvers_table(found),
         "methods_accuracy": methods_table(found),
     }
+    return {name: list(table) for name, table in tables.items()}
