@@ -336,9 +336,7 @@ def examine_file(frame: Frame, options: PaperOptions, truth: Mapping[str, KnownP
 
 def usable_pixels(source: Source) -> NDArray[Any]:
     """Clear the pixels of a map, shape (H, W), that may not be used: 0 is no data."""
-    if source.allowed is None:
-        return source.disparity
-    return np.where(source.allowed, source.disparity, 0)
+    return np.where(True if source.allowed is None else source.allowed, source.disparity, 0)
 
 
 def lost(frame: Frame, reason: str) -> Examined:

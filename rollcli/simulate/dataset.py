@@ -101,13 +101,11 @@ def calibration(spec: FrameSpec) -> bytes:
     Both are 3x4, row by row, in pixels and metres; the fourth number of P1 is -focal * baseline. See Geiger,
     Lenz, Urtasun, "Are we ready for autonomous driving?", CVPR 2012.
     """
-    (cx, cy), focal = spec.centre, spec.focal
-    views = (
-        ((focal, 0.0, cx, fourth), (0.0, focal, cy, 0.0), (0.0, 0.0, 1.0, 0.0))
-        for fourth in (0.0, -focal * spec.baseline)
-    )
-    lines = (f"P{i}: {' '.join(f'{x:.12e}' for row in view for x in row)}\n" for i, view in enumerate(views))
-    return "".join(lines).encode()
+    text, (cx, cy), focal = "", spec.centre, spec.focal
+    for i, fourth in enumerate((0.0, -focal * spec.baseline)):
+        view = focal, 0.0, cx, fourth, 0.0, focal, cy, 0.0, 0.0, 0.0, 1.0, 0.0
+        text += f"P{i}: {' '.join(f'{x:.12e}' for x in view)}\n"
+    return text.encode()
 
 
 def _path(folder: Path, part: str, stem: str) -> Path:

@@ -9,9 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rollcli.simulate.materials import Material, Values, coarse, fine
 from rollcli.simulate.relief import Array, Vectors
-from rollcli.simulate.surfaces import NEAR, Surface, SurfaceSample
-
-_UP = np.eye(3, dtype=np.float32)[:, 1:2]
+from rollcli.simulate.surfaces import NEAR, UP, Surface, SurfaceSample
 
 
 def dots(axes: Vectors, vectors: Vectors) -> Vectors:
@@ -96,7 +94,7 @@ class Post:
         x, y, z = points - self.foot[:, None]
         normal = np.array([x, np.zeros_like(x), z]) / self.radius
         around = np.array([-z, np.zeros_like(x), x]) / self.radius
-        return SurfaceSample(normal, self.radius * np.arctan2(x, -z), y, around, _UP, self.material)
+        return SurfaceSample(normal, self.radius * np.arctan2(x, -z), y, around, UP, self.material)
 
     def bounds(self) -> Array | None:
         across = (-self.radius, self.radius)
@@ -115,9 +113,8 @@ class TreeCrown:
     def intersect(self, origin: Array, direction: Array) -> Array:
         squash = np.array([[1.0], [self.radius / self.half_height], [1.0]])
         o, r = (origin - self.centre[:, None]) * squash, direction * squash
-        near, far = _sphere_roots(
-            (r * r).sum(axis=0), (o * r).sum(axis=0), (o * o).sum(axis=0) - self.radius**2
-        )
+        a, half_b, c = ((one * other).sum(axis=0) for one, other in ((r, r), (o, r), (o, o)))
+        near, far = _sphere_roots(a, half_b, c - self.radius**2)
         first = np.full(r.shape[1], np.inf)
         for t in (far, near):
             hit = np.flatnonzero(t > NEAR)
@@ -138,7 +135,7 @@ class TreeCrown:
         x, y, z = points - self.centre[:, None]
         normal = np.array([x, y * (self.radius / self.half_height) ** 2, z])
         around = np.array([-z, np.zeros_like(x), x]) * (self.radius / np.maximum(x * x + z * z, 0.01))
-        return SurfaceSample(normal, self.radius * np.arctan2(x, -z), y, around, _UP, self.material)
+        return SurfaceSample(normal, self.radius * np.arctan2(x, -z), y, around, UP, self.material)
 
     def bounds(self) -> Array | None:
         across, up = (-self.radius, self.radius), (-self.half_height, self.half_height)

@@ -242,7 +242,7 @@ class Backdrop(Surface):
 
     def sample(self, points: Array) -> SurfaceSample:
         elevation = self.course.elevation(points)
-        return SurfaceSample(-_AHEAD, points[0], elevation, _RIGHT, _UP, self.material)
+        return SurfaceSample(-_AHEAD, points[0], elevation, _RIGHT, UP, self.material)
 
 
 def first_root(a: Array, b: Array, c: Array) -> Array:
@@ -272,4 +272,4 @@ def _first_descent(above: Callable[[Array], Array], first: Array, last: Array, b
 
 
 # single precision: double precision would double the cost of shading
-_RIGHT, _UP, _AHEAD = np.eye(3, dtype=np.float32)[:, :, None]
+_RIGHT, UP, _AHEAD = np.eye(3, dtype=np.float32)[:, :, None]

@@ -50,9 +50,8 @@ _GLASS, _BLACK, _RED, _WHITE, _CARGO = range(len(_PAINTS), len(_PAINTS) + 5)
 
 def car_materials(offset: float) -> list[Material]:
     """Return the materials of `vehicle` in order: paints, glass, tyres, red and white lights, cargo box."""
-    paints: list[Material] = [CarPaint(level, tint=tint, offset=offset) for level, tint in _PAINTS]
     return [
-        *paints,
+        *(CarPaint(level, tint=tint, offset=offset) for level, tint in _PAINTS),
         Glass(0.09, tint=(1.05, 1.0, 0.95), offset=offset),
         Plain(0.03, 0.3, 0.1),
         Plain(0.45, 0.05, 0.05, tint=(0.15, 0.15, 1.0)),
