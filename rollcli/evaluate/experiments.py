@@ -328,13 +328,18 @@ def examine_file(frame: Frame, options: PaperOptions, truth: Mapping[str, KnownP
         source = read_source(frame, options.frame)
         known = truth.get(stem_of(frame.file))
         theta = None if known is None else known.theta
-        findings = examine(frame.file, usable_pixels(source), turns, theta, chosen=options.has_region)
+        findings = examine(frame.file, _usable_pixels(source), turns, theta, chosen=options.has_region)
     except FRAME_ERRORS as error:
         return frame_of_error(frame, error), None
     return FrameResult(Row(frame.file, status="ok"), source.encoding, source.warnings), findings
 
 
-def usable_pixels(source: Source) -> NDArray[Any]:
+def time_file(frame: Frame, options: PaperOptions) -> Times:
+    """Read a map and time the solvers on it."""
+    return time_solvers(_usable_pixels(read_source(frame, options.frame)))
+
+
+def _usable_pixels(source: Source) -> NDArray[Any]:
     """Clear the pixels of a map, shape (H, W), that may not be used: 0 is no data."""
     return np.where(True if source.allowed is None else source.allowed, source.disparity, 0)
 

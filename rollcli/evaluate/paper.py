@@ -6,7 +6,7 @@ from functools import partial
 
 from rollcli import __version__
 from rollcli.errors import ExitStatus, UsageError
-from rollcli.evaluate.experiments import Findings, Times, examine_file, lost, time_solvers, usable_pixels
+from rollcli.evaluate.experiments import Examined, Findings, Times, examine_file, lost, time_file
 from rollcli.evaluate.options import PaperOptions
 from rollcli.evaluate.paper_tables import DELTAS_DEG, METHOD_NAMES, SOLVER_NAMES, all_tables, table_csv
 from rollcli.evaluate.truth import KnownPose, read_truth
@@ -19,7 +19,6 @@ from rollcli.run.find import find_frames
 from rollcli.run.frame import Frame
 from rollcli.run.outputs import check_places, listed_only
 from rollcli.run.progress import Progress
-from rollcli.run.read import read_source
 from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import stop_on_signals
 from rollcli.run.workers.tasks import run_tasks
@@ -76,31 +75,29 @@ def _known_angles(frames: Sequence[Frame], options: PaperOptions) -> Mapping[str
 def _run(frames: Sequence[Frame], truth: Mapping[str, KnownPose], options: PaperOptions) -> ExitStatus:
     work = Work(partial(examine_file, options=options, truth=truth), lost)
     progress = Progress(len(frames), options.running, options.encoding, statuses=("ok",))
-    found: list[Findings] = []
-    failed: list[Row] = []
+    examined: list[Examined] = []
     with (
         stop_on_signals() as stop,
         progress,
         contextlib.closing(run_tasks(frames, work, stop, Workers(options.running.jobs))) as all_examined,
     ):
-        for result, findings in all_examined:
-            progress.add(result)
-            if findings is None:
-                failed.append(result.row)
-            else:
-                found.append(findings)
+        for each in all_examined:
+            progress.add(each[0])
+            examined.append(each)
     if stop.asked:
         progress.say(f"interrupted after {progress.done} of {progress.total} maps; nothing is written")
         return ExitStatus.INTERRUPTED
     progress.tell_end()
+    found = [findings for _, findings in examined if findings is not None]
+    failed = [result.row for result, findings in examined if findings is None]
     if not found:
         progress.say("no map gave an angle: there is nothing to tabulate")
         return progress.summary.status
-    good = {findings.file for findings in found}
-    chosen = [frame for frame in frames if frame.file in good][: options.experiments.timed]
+    good = [frame for frame, (_, findings) in zip(frames, examined, strict=True) if findings is not None]
+    chosen = good[: options.experiments.timed]
     progress.note(f"run times, on {len(chosen)} of the maps")
     # in this process alone
-    times = [time_solvers(usable_pixels(read_source(frame, options.frame))) for frame in chosen]
+    times = [time_file(frame, options) for frame in chosen]
     for name, data in paper_files(found, failed, times, options).items():
         write_output(within(options.experiments.output, name), data, overwrite=options.running.overwrite)
     progress.note(f"{within(options.experiments.output, PAGE)} and {len(TABLES)} tables are written")

@@ -62,25 +62,23 @@ def cross_section(spec: FrameSpec, left: float, right: float, bend: float) -> Cr
         The road's horizontal curvature, 1/m: superelevation raises the outer side of a bend. A straight
         road falls to the right.
     """
-    middle, half, crossfall = (left + right) / 2, (right - left) / 2, spec.crossfall
-    pieces = [Piece(left, right)]
-    if spec.cross_section == "roof":
-        rising = Piece(left, middle, crossfall, offset=-2 * crossfall * middle)
-        pieces = [rising, Piece(middle, right, -crossfall)]
-    elif spec.cross_section in ("crown", "dish"):
-        camber = (crossfall if spec.cross_section == "dish" else -crossfall) / half
-        pieces = [Piece(left, right, -camber * middle, camber)]
-    elif spec.cross_section == "superelevated":
-        pieces = [Piece(left, right, crossfall if bend < 0 else -crossfall)]
+    middle, crossfall = (left + right) / 2, spec.crossfall
+    camber = crossfall / ((right - left) / 2)
+    rising = Piece(left, middle, crossfall, offset=-2 * crossfall * middle)
+    pieces = {
+        "flat": [Piece(left, right)],
+        "crown": [Piece(left, right, camber * middle, -camber)],
+        "roof": [rising, Piece(middle, right, -crossfall)],
+        "dish": [Piece(left, right, -camber * middle, camber)],
+        "superelevated": [Piece(left, right, crossfall if bend < 0 else -crossfall)],
+    }[spec.cross_section]
     if spec.gutter:
         inner, outer = left + GUTTER_WIDTH, right - GUTTER_WIDTH
-        gutters = (
+        pieces = [
             _straight(left, inner, inner, pieces[0], spec.gutter),
+            *(piece._replace(start=max(piece.start, inner), end=min(piece.end, outer)) for piece in pieces),
             _straight(outer, right, outer, pieces[-1], -spec.gutter),
-        )
-        pieces[0] = pieces[0]._replace(start=inner)
-        pieces[-1] = pieces[-1]._replace(end=outer)
-        pieces = [gutters[0], *pieces, gutters[1]]
+        ]
     below_rig = CrossSection(tuple(pieces)).elevation(0.0)
     return CrossSection(tuple(piece._replace(offset=piece.offset - below_rig) for piece in pieces))
 

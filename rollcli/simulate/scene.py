@@ -71,8 +71,7 @@ class Solid:
 
     def bounds(self, margin: float = 0.0) -> Array | None:
         """Return the corners as `Surface.bounds` does, with `margin` metres more on each side."""
-        grid = _corners(self.extent + np.array([-margin, margin]))
-        return np.asarray(self.frame.T @ grid + self.place[:, None])
+        return self.frame.T @ _corners(self.extent + np.array([-margin, margin])) + self.place[:, None]
 
 
 @dataclass(frozen=True)
