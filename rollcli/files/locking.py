@@ -21,16 +21,12 @@ _POLL_S = 0.05
 _LOCK = ".lock"
 
 
-class _NoLocksError(Exception):
-    """The file system has no locks."""
-
-
 if sys.platform == "win32":
     import msvcrt
 
     _FAR_BYTE = 2**62  # locked bytes cannot be read by others: take one that no result reaches
 
-    def _try_lock(descriptor: int) -> bool:
+    def _try_lock(descriptor: int) -> bool | None:
         os.lseek(descriptor, _FAR_BYTE, os.SEEK_SET)
         try:
             msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
@@ -53,15 +49,14 @@ if sys.platform == "win32":
 else:
     import fcntl
 
-    def _try_lock(descriptor: int) -> bool:
+    _WITHOUT_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.EINVAL, errno.ENOSYS)
+
+    def _try_lock(descriptor: int) -> bool | None:
+        """Return whether the lock is taken now; None where the file system has no locks."""
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return False
         except OSError as error:
-            if error.errno in (errno.ENOLCK, errno.ENOTSUP, errno.EINVAL, errno.ENOSYS):
-                raise _NoLocksError from error
-            return False
+            return None if error.errno in _WITHOUT_LOCKS else False
         return True
 
     @contextlib.contextmanager
@@ -80,15 +75,10 @@ else:
         """Yield whether the path is a regular file that no live process is writing; a link is none."""
         descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
         try:
-            yield stat.S_ISREG(os.fstat(descriptor).st_mode) and _is_free(descriptor)
+            # where there are no locks, nobody can hold one
+            yield stat.S_ISREG(os.fstat(descriptor).st_mode) and _try_lock(descriptor) is not False
         finally:
             os.close(descriptor)
-
-    def _is_free(descriptor: int) -> bool:
-        try:
-            return _try_lock(descriptor)
-        except _NoLocksError:  # nobody can hold it
-            return True
 
 
 @contextlib.contextmanager
@@ -104,14 +94,12 @@ def locked(descriptor: int, name: str) -> Iterator[None]:
     OutputError
         The lock file cannot be made.
     """
-    try:
-        take_lock(descriptor, name)
-    except _NoLocksError:
+    if take_lock(descriptor, name):
+        yield
+    else:
         say(f"{name}: its file system has no locks; {name}{_LOCK} keeps other runs away")
         with _lock_file(name):
             yield
-    else:
-        yield
 
 
 @contextlib.contextmanager
@@ -158,8 +146,8 @@ def _lock_file(name: str) -> Iterator[None]:
         path.unlink(missing_ok=True)
 
 
-def take_lock(descriptor: int, name: str) -> None:
-    """Take the lock on an open file, which lasts until the file is closed.
+def take_lock(descriptor: int, name: str) -> bool:
+    """Take the lock on an open file, which lasts until the file is closed; false where there are no locks.
 
     Raises
     ------
@@ -167,12 +155,13 @@ def take_lock(descriptor: int, name: str) -> None:
         Another run holds it.
     """
     give_up = time.monotonic() + _PATIENCE_S
-    while not _try_lock(descriptor):
+    while (taken := _try_lock(descriptor)) is False:
         if time.monotonic() > give_up:
             raise UsageError(
                 f"{name}: another run is writing this result; wait for it, or give another --output"
             )
         time.sleep(_POLL_S)
+    return bool(taken)
 
 
 def exists_already(name: str) -> UsageError:
