@@ -155,7 +155,11 @@ def check_pfm(data: bytes, size: int, name: str) -> tuple[str, int, int, int]:
     if header[1] == b"F":
         raise InputError(f"{name}: is a colour PFM (PF); a disparity map has one channel (Pf)")
     width, height = int(header[2]), int(header[3])
-    raw_map.require_pixels(width, height, name, 4 * width * height, size - header.end())
+    needed, there = 4 * width * height, size - header.end()
+    if there < needed:
+        raise InputError(
+            f"{name}: is truncated: {width} x {height} pixels need {needed} bytes, {there} are there"
+        )
     raw_map.require_decoded_fits(width, height, 4, size, name)
     return "<f4" if header[4].startswith(b"-") else ">f4", width, height, header.end()
 

@@ -146,8 +146,6 @@ def decode_exr(data: bytes, name: str) -> Stored:
     if at < len(_WINDOW) or at + 16 > len(data):
         raise InputError(f"{name}: is a damaged EXR: its size cannot be read")
     left, top, right, bottom = np.frombuffer(data, "<i4", 4, at).tolist()
-    if right < left or bottom < top:
-        raise InputError(f"{name}: has no pixels")
     require_decoded_fits(right - left + 1, bottom - top + 1, 12, len(data), name)
     os.environ.setdefault("OPENCV_IO_ENABLE_OPENEXR", "1")  # OpenCV looks at it when it reads the first EXR
     pixels, _ = decoded_by_opencv(data, cv2.IMREAD_UNCHANGED)

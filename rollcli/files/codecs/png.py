@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, OutputError
-from rollcli.files.codecs.raw_map import COLOUR_REMEDY, Stored, require_decoded_fits, require_pixels
+from rollcli.files.codecs.raw_map import COLOUR_REMEDY, Stored, require_decoded_fits
 
 # a camera image as it lies in the file, grey or BGR: turning it by its EXIF tag would break rectification
 PICTURE_FLAGS = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
@@ -289,7 +289,6 @@ def _header(body: bytes, name: str) -> _Header:
     sane = header.depth in _DEPTHS.get(header.colour, ()) and header.interlace <= 1
     if not sane or header.compression or header.filtering or max(header[:2]) > _MAX_SIDE:
         raise InputError(f"{name}: is a damaged PNG: its header makes no sense")
-    require_pixels(header.width, header.height, name)
     return header
 
 

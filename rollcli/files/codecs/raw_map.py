@@ -55,20 +55,10 @@ def require_map_shape(shape: tuple[int, ...], name: str) -> None:
         raise InputError(f"{name}: has no pixels (shape {shape})")
 
 
-def require_pixels(width: int, height: int, name: str, needed: int = 0, there: int = 0) -> None:
-    """Refuse an image without pixels, and one of whose bytes fewer are there than are needed."""
-    if width == 0 or height == 0:
-        raise InputError(f"{name}: has no pixels ({width} x {height})")
-    if there < needed:
-        raise InputError(
-            f"{name}: is truncated: {width} x {height} pixels need {needed} bytes, {there} are there"
-        )
-
-
 def require_decoded_fits(
     width: int, height: int, pixel_bytes: int, stored: int, name: str, *, mask: bool = False
 ) -> None:
-    """Refuse an image that would take more memory than any map, or more than its file can be worth.
+    """Refuse an image without pixels, or of more memory than any map takes or its file can be worth.
 
     Parameters
     ----------
@@ -83,6 +73,8 @@ def require_decoded_fits(
     mask : bool
         Nothing is computed from it: it may stand for as much as any file, and masks compress best of all.
     """
+    if width < 1 or height < 1:
+        raise InputError(f"{name}: has no pixels ({width} x {height})")
     needed = width * height * (pixel_bytes if mask else max(pixel_bytes, _FLOAT32))
     limit = _MOST if mask else min(_MOST, max(MOST_SMALL, MOST_EXPANSION * stored))
     hint = "; save it uncompressed" if needed <= _MOST else ""

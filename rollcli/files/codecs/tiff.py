@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 from rollcli.files.codecs.png import decoding
-from rollcli.files.codecs.raw_map import COLOUR_REMEDY, Stored, native, require_decoded_fits, require_pixels
+from rollcli.files.codecs.raw_map import COLOUR_REMEDY, Stored, native, require_decoded_fits
 
 _NONE, _LZW, _DEFLATE, _OLD_DEFLATE, _PACKBITS = 1, 5, 8, 32946, 32773
 # how many bytes one byte can stand for
@@ -229,12 +229,11 @@ def _first_page(data: bytes, name: str) -> Iterator[tuple[Any, Any]]:
 def _pixels(page: Any, data: bytes, name: str) -> NDArray[Any]:
     """Return the numbers of one page; shape (H, W, channels)."""
     width, height, samples = int(page.imagewidth), int(page.imagelength), int(page.samplesperpixel)
-    require_pixels(width, height, name)
     if int(page.imagedepth) != 1:
         raise InputError(f"{name}: is a volume of {page.imagedepth} slices, not a 2-D image")
     if page.dtype is None or page.dtype.kind not in "biuf":
         raise InputError(f"{name}: its pixels are no real numbers")
-    _require_size(page, width * height * samples, data, name)
+    _require_size(page, width, height, data, name)
     across, down = _part_size(page, name)
     chunky = samples == 1 or page.planarconfig == _CHUNKY
     planes = 1 if chunky else samples
@@ -270,18 +269,17 @@ def _part_size(page: Any, name: str) -> tuple[int, int]:
     return across, down
 
 
-def _require_size(page: Any, numbers: int, data: bytes, name: str) -> None:
+def _require_size(page: Any, width: int, height: int, data: bytes, name: str) -> None:
     """Refuse parts beyond the file's end, and sizes that the bytes cannot hold."""
     stored = sum(page.databytecounts)
     for offset, count in zip(page.dataoffsets, page.databytecounts, strict=True):
         if offset + count > len(data):
             raise InputError(f"{name}: is truncated: its pixels end at byte {offset + count} of {len(data)}")
-    width, height = int(page.imagewidth), int(page.imagelength)
-    pixel_bytes = numbers // (width * height) * page.dtype.itemsize
-    require_decoded_fits(width, height, pixel_bytes, len(data), name)
+    samples = int(page.samplesperpixel)
+    require_decoded_fits(width, height, samples * page.dtype.itemsize, len(data), name)
     if not all(page.databytecounts):
         return  # a sparse file: parts without a place hold no data [GDAL]
-    needed = numbers * int(page.bitspersample) // 8
+    needed = width * height * samples * int(page.bitspersample) // 8
     if needed > _MAX_EXPANSION.get(int(page.compression), needed) * stored:
         raise InputError(
             f"{name}: its header claims {width} x {height} pixels, more than {stored} bytes can hold"

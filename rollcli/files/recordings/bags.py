@@ -398,9 +398,7 @@ class _Sqlite:
                 if whole and name in begins:
                     with self._base.blobopen("messages", "data", number, readonly=True) as blob:
                         data = blob.read(_BEGINNING)
-                elif (
-                    name in topics or not whole
-                ):  # of a file that is cut off, the first that is not there ends it
+                elif name in topics or not whole:  # the first that a file which is cut off has not ends it
                     data = self.read((number, 0)).data
                 count += 1
                 if name in topics:

@@ -14,7 +14,7 @@ from rollcli.errors import InputError
 from rollcli.extras import require_extra
 from rollcli.files.bounded import MOST_BYTES
 from rollcli.files.codecs import pictures, png
-from rollcli.files.codecs.raw_map import require_decoded_fits, require_pixels
+from rollcli.files.codecs.raw_map import require_decoded_fits
 from rollcli.files.recordings.bags import Topic
 
 DISPARITY = "stereo_msgs/DisparityImage"
@@ -73,9 +73,7 @@ class CameraInfo:
     @property
     def changes_raw_views(self) -> bool:
         """Whether a raw view is not the rectified one."""
-        upright = all(
-            abs(each - one) <= 1e-9 for each, one in zip(self.r, (1, 0, 0, 0, 1, 0, 0, 0, 1), strict=True)
-        )
+        upright = np.allclose(self.r, np.eye(3).ravel(), rtol=0, atol=1e-9)
         return self.usable and self.k[0] > 0 and (any(self.d) or (not upright and any(self.r)))
 
 
@@ -237,7 +235,6 @@ def _pixels(image: Any, name: str) -> NDArray[Any]:
         raise InputError(f"{name}: has pixels of the encoding {encoding[:40]!r}, which is not read")
     dtype = np.dtype(kind).newbyteorder(">" if image.is_bigendian else "<")
     row = width * channels * dtype.itemsize
-    require_pixels(width, height, name)
     if step < row:
         raise InputError(
             f"{name}: its rows have {step} bytes, of {row} that {width} pixels of {encoding} need"
@@ -282,10 +279,6 @@ def _rectification(info: CameraInfo) -> tuple[NDArray[Any], NDArray[Any]]:
     size = (info.width, info.height)
     k, r, p = (np.array(each).reshape(3, -1) for each in (info.k, info.r, info.p))
     turned = r if r.any() else np.eye(3)
-    if info.model in _FISHEYE:
-        found = cv2.fisheye.initUndistortRectifyMap(
-            k, np.array(info.d[:4]), turned, p[:, :3], size, cv2.CV_32FC1
-        )
-    else:
-        found = cv2.initUndistortRectifyMap(k, np.array(info.d), turned, p[:, :3], size, cv2.CV_32FC1)
+    of, d = (cv2.fisheye, info.d[:4]) if info.model in _FISHEYE else (cv2, info.d)
+    found = of.initUndistortRectifyMap(k, np.array(d), turned, p[:, :3], size, cv2.CV_32FC1)
     return found[0], found[1]
