@@ -110,7 +110,7 @@ _CONNECT_S = 5
 _RETRIES = 6  # by obstore: answers 5xx and refused connections
 _RETRY_S = 60
 _PAGE = 1000
-_TRIES = 4  # by this module: a body that is cut in the middle, and a creation whose answer is lost
+_TRIES = 4  # by this module: a body that is cut in the middle, and an answer that is lost
 _FIRST_PAUSE_S = 0.2
 _OWNER = "rollcli-run"  # attribute of an object: who wrote it
 
@@ -297,17 +297,23 @@ def _telling(url: str, done: str, error: type[RollcliError], limits: str = "") -
 
 
 def _repeated(fetch: Callable[[], Value]) -> Value:
-    """Call `fetch` again, after growing pauses, when an answer is lost or cut short on its way."""
+    """Call `fetch` again when an answer of a store is lost or cut short on its way."""
     from obstore.exceptions import GenericError
 
     give_up = time.monotonic() + _RETRY_S
+    return repeated(fetch, lambda error: isinstance(error, GenericError) and not is_final(error), give_up)
+
+
+def repeated(fetch: Callable[[], Value], may_pass: Callable[[Exception], bool], give_up: float) -> Value:
+    """Call `fetch` again, after growing pauses and up to a moment, as long as what it raises may pass."""
     for attempt in range(_TRIES - 1):
         try:
             return fetch()
-        except GenericError as error:
-            if is_final(error) or time.monotonic() > give_up:
+        except Exception as error:
+            pause = _FIRST_PAUSE_S * 4**attempt
+            if not may_pass(error) or time.monotonic() + pause > give_up:
                 raise
-            time.sleep(_FIRST_PAUSE_S * 4**attempt)
+        time.sleep(pause)
     return fetch()
 
 

@@ -8,10 +8,8 @@ import urllib.request
 from rollcli.errors import InputError
 from rollcli.files.bounded import MOST_BYTES, in_words, too_large
 from rollcli.files.stores.locations import public_name, store_of, wait_for_room, waiting_for_network
-from rollcli.files.stores.objects import TIMEOUT_VARIABLE, request_seconds, within_seconds
+from rollcli.files.stores.objects import TIMEOUT_VARIABLE, repeated, request_seconds, within_seconds
 
-_TRIES = 4
-_FIRST_PAUSE_S = 0.2
 _PIECE = 2**20  # bytes
 _PASSWORD = "servers are asked without user and password; take them out of the URL, or sign it"
 
@@ -37,20 +35,20 @@ def read_web_file(url: str, most: int = MOST_BYTES) -> bytes:
         raise InputError(f"{public_name(url)}: cannot be read: {_PASSWORD}", _PASSWORD)
     seconds = request_seconds()
     give_up = time.monotonic() + seconds
-    for attempt in range(_TRIES):
-        try:
-            with waiting_for_network():
-                return _fetched(url, give_up, most, within_seconds(seconds))
-        except urllib.error.HTTPError as error:
-            reason, final = f"the server answered {error.code} {error.reason}", error.code < 500
-        except (OSError, http.client.HTTPException, ValueError) as error:
-            reason = _reason(error, seconds, most)
-            final = isinstance(error, ValueError | http.client.InvalidURL)  # no address, whoever is asked
-        pause = _FIRST_PAUSE_S * 4**attempt
-        if final or time.monotonic() + pause > give_up:
-            break
-        time.sleep(pause)
+    try:
+        with waiting_for_network():
+            return repeated(lambda: _fetched(url, give_up, most, within_seconds(seconds)), _may_pass, give_up)
+    except (OSError, http.client.HTTPException, ValueError) as error:
+        reason = _reason(error, seconds, most)
     raise InputError(f"{public_name(url)}: cannot be read: {reason}", reason)
+
+
+def _may_pass(error: Exception) -> bool:
+    """Tell whether a server may answer otherwise when it is asked again; of no address none does."""
+    if isinstance(error, urllib.error.HTTPError):
+        return error.code >= 500
+    broken = isinstance(error, OSError | http.client.HTTPException)
+    return broken and not isinstance(error, http.client.InvalidURL)
 
 
 def web_problem(url: str) -> str:
@@ -62,8 +60,7 @@ def web_problem(url: str) -> str:
         urllib.request.urlopen(request, timeout=request_seconds()).close()
     except urllib.error.HTTPError as error:
         if error.code in (400, 401, 403):  # Amazon answers 400 when temporary keys have expired
-            answer = f"the server answered {error.code} {error.reason}"
-            return f"{answer}; the signature of the URL may have expired"
+            return f"{_answered(error)}; the signature of the URL may have expired"
     except (OSError, http.client.HTTPException, ValueError):
         pass  # reading it says what is wrong
     return ""
@@ -91,7 +88,13 @@ def _fetched(url: str, give_up: float, most: int, within: str) -> bytes:
     return bytes(data)
 
 
+def _answered(error: urllib.error.HTTPError) -> str:
+    return f"the server answered {error.code} {error.reason}"
+
+
 def _reason(error: Exception, seconds: float, most: int) -> str:
+    if isinstance(error, urllib.error.HTTPError):
+        return _answered(error)
     if isinstance(error, TimeoutError) or "timed out" in str(error):
         limits = f"({seconds:g}), for up to {in_words(most)}"
         return f"the server takes too long; {TIMEOUT_VARIABLE} sets the seconds it may take {limits}"
