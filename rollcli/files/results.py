@@ -447,12 +447,9 @@ def parse_rows(data: bytes, name: str | Path) -> Iterator[Row]:
     InputError
         They are no result; the line is named.
     """
-    names, rows = cells_of(data, str(name), [field.name for field in fields(Row)])
-    for where, *cells in rows:
-        place = f"{name}: {where}"
-        yield Row(
-            **{column: value_of(column, cell, place) for column, cell in zip(names, cells, strict=True)}
-        )
+    for found in _values_of(data, str(name), [field.name for field in fields(Row)]):
+        for values in zip(*found.values(), strict=True):
+            yield Row(**dict(zip(found, values, strict=True)))
 
 
 def run_path(path: str | Path) -> str:
@@ -482,16 +479,6 @@ def read_run(path: str | Path) -> Mapping[str, Any] | None:
 
 
 _MOST = 1e40  # more than any float32 of a map; of what is larger squares cannot be summed
-
-
-def value_of(name: str, value: Any, where: str) -> Any:
-    """Convert the text (CSV) or JSON value of a column."""
-    try:
-        return READERS[name](value)
-    except (KeyError, ValueError, TypeError, OverflowError) as error:
-        what = f"status: {', '.join(STATUSES)}" if name == "status" else f"value for {name}"
-        shown = "" if value is None else value
-        raise InputError(f"{where}: {shown!r:.80} is no {what}") from error
 
 
 def _status(value: Any) -> str:
@@ -547,7 +534,6 @@ def _reader(name: str, kind: type) -> Callable[[Any], Any]:
 
 # what makes values of cells, by column
 READERS = {name: _reader(name, kind) for name, kind in column_types(FURTHER).items()}
-_EMPTY = frozenset({"", None})
 _CHUNK = 300  # rows that are held as text: twenty thousand do not fit into a cache, and take a third longer
 
 
@@ -600,12 +586,7 @@ def read_columns(path: str, wanted: Sequence[str]) -> ResultColumns:
     files, status, methods = list[str](), array("B"), set[str]()
     numbers: dict[str, array[float]] = {}
     for part, data in pieces_of(path):
-        names, rows = cells_of(data, part, ["file", "status", "method", *wanted])
-        while chunk := list(islice(rows, _CHUNK)):
-            lines, *columns = zip(*chunk, strict=True)
-            found = {
-                name: _values(name, cells, lines, part) for name, cells in zip(names, columns, strict=True)
-            }
+        for found in _values_of(data, part, ["file", "status", "method", *wanted]):
             files += found["file"]
             status.extend(map(STATUSES.index, found["status"]))
             methods.update(filter(None, found.get("method", ())))
@@ -616,11 +597,24 @@ def read_columns(path: str, wanted: Sequence[str]) -> ResultColumns:
     return ResultColumns(path, files, status, numbers, frozenset(methods), run)
 
 
+def _values_of(data: bytes, path: str, wanted: Sequence[str]) -> Iterator[dict[str, list[Any]]]:
+    """Yield the values of columns by their names, of some rows at a time; see `cells_of`."""
+    names, rows = cells_of(data, path, wanted)
+    while chunk := list(islice(rows, _CHUNK)):
+        lines, *columns = zip(*chunk, strict=True)
+        yield {name: _values(name, cells, lines, path) for name, cells in zip(names, columns, strict=True)}
+
+
 def _values(name: str, cells: Sequence[Any], lines: Sequence[str], path: str) -> list[Any]:
-    """Return the values of a column's cells; where one has none, raise the error of the first."""
+    """Convert the cells of a column, which are texts of CSV or values of JSON."""
+    read, found = READERS[name], list[Any]()
     try:
-        if _EMPTY.issuperset(cells):  # most columns of many results
-            return [READERS[name](None)] * len(cells)
-        return list(map(READERS[name], cells))
-    except (KeyError, ValueError, TypeError, OverflowError):
-        return [value_of(name, cell, f"{path}: {line}") for cell, line in zip(cells, lines, strict=True)]
+        if cells.count("") + cells.count(None) == len(cells):  # most columns of many results
+            return [read(None)] * len(cells)
+        found.extend(map(read, cells))
+    except (KeyError, ValueError, TypeError, OverflowError) as error:
+        value, line = cells[len(found)], lines[len(found)]
+        what = f"status: {', '.join(STATUSES)}" if name == "status" else f"value for {name}"
+        shown = "" if value is None else value
+        raise InputError(f"{path}: {line}: {shown!r:.80} is no {what}") from error
+    return found
