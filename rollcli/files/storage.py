@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rollcli.errors import InputError, OutputError, UsageError, output_error, reading, writing
 from rollcli.files import atomic, bounded
-from rollcli.files.bounded import MOST_BYTES, too_large
+from rollcli.files.bounded import MOST_BYTES
 from rollcli.files.containers import file_of, read_member
 from rollcli.files.stores import objects
 from rollcli.files.stores.locations import is_url, is_web_url, public_name
@@ -294,12 +294,10 @@ def _read_file(path: str, name: str, most: int = MOST_BYTES, begins: Beginning =
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
                 raise InputError(f"{name}: is not a regular file")
-            if status.st_size > most:
-                raise too_large(name, status.st_size, most)
-            if begins is not None and status.st_size > _HEAD:
+            if begins is not None and _HEAD < status.st_size <= most:
                 begins(file.read(_HEAD), status.st_size, name)
                 file.seek(0)
-            return bounded.read_up_to(file, name, status.st_size, most)
+            return bounded.read_stream(file, name, most)
     except IsADirectoryError:
         raise InputError(f"{name}: is a folder, not a file") from None
     except FileNotFoundError:
