@@ -14,6 +14,7 @@ from typing import BinaryIO, TypeVar
 
 from rollcli.errors import OutputError, cause_of, writing
 from rollcli.files.locking import being_written, nobody_writes
+from rollcli.files.naming import gathered
 from rollcli.files.stores.locations import is_url
 
 Thing = TypeVar("Thing")
@@ -174,22 +175,15 @@ def atomic_file(path: str | Path, *, durable: bool = False, replaces: bool = Tru
         if target.is_dir():
             raise OutputError(f"{path}: cannot be written: is a folder")
         with _new_part(target) as (temporary, file):
-            try:
-                yield file
-                if durable:
-                    file.flush()
-                    os.fsync(file.fileno())
-                file.close()
-                if replaces:
-                    temporary.replace(target)
-                else:
-                    _take_free_name(temporary, target)
-            except BaseException:
-                with contextlib.suppress(OSError):
-                    file.close()  # Windows removes no open file
-                with contextlib.suppress(OSError):
-                    temporary.unlink()
-                raise
+            yield file
+            if durable:
+                file.flush()
+                os.fsync(file.fileno())
+            file.close()
+            if replaces:
+                temporary.replace(target)
+            else:
+                _take_free_name(temporary, target)
         if durable:
             sync_names([target])
 
@@ -217,8 +211,6 @@ def _take_free_name(temporary: Path, target: Path) -> None:
         if error.errno == errno.EEXIST or os.path.lexists(target):
             raise NameTakenError(f"{target}: exists already") from None
         temporary.replace(target)
-    else:
-        temporary.unlink()
 
 
 def mark_path(path: str) -> str:
@@ -249,7 +241,7 @@ def remove_leftovers(paths: Iterable[str | Path]) -> None:
 
 @contextlib.contextmanager
 def _new_part(target: Path) -> Iterator[tuple[Path, BinaryIO]]:
-    """Make a temporary file that did not exist, and hold it until the block ends."""
+    """Make a temporary file that did not exist, and hold it until the block ends, and remove what is left."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL  # which follows no link either
     flags |= getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
     while True:
@@ -260,7 +252,13 @@ def _new_part(target: Path) -> Iterator[tuple[Path, BinaryIO]]:
             continue
         with os.fdopen(descriptor, "wb") as file, being_written(file):
             if os.fstat(descriptor).st_nlink:  # not removed as a leftover in the moment before it was held
-                yield path, file
+                try:
+                    yield path, file
+                finally:
+                    with contextlib.suppress(OSError):
+                        file.close()  # Windows removes no open file
+                    with contextlib.suppress(OSError):
+                        path.unlink()
                 return
 
 
@@ -272,9 +270,7 @@ def _marker(name: str) -> str:
 
 def _parts_in(folder: str) -> dict[str, list[str]]:
     """List the temporary files in a folder, by what identifies their targets."""
-    found: dict[str, list[str]] = {}
     with contextlib.suppress(OSError), os.scandir(folder or ".") as entries:
-        for entry in entries:
-            if match := _PART.fullmatch(entry.name):
-                found.setdefault(match[1], []).append(entry.path)
-    return found
+        parts = ((_PART.fullmatch(entry.name), entry.path) for entry in entries)
+        return gathered((match[1], path) for match, path in parts if match)
+    return {}
