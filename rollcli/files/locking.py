@@ -113,17 +113,14 @@ def locked_folder(name: str) -> Iterator[None]:
     OutputError
         The folder cannot be made.
     """
-    with writing(name):
-        Path(name).mkdir(parents=True, exist_ok=True)
-        descriptor = None if sys.platform == "win32" else os.open(name, os.O_RDONLY | os.O_CLOEXEC)
-    if descriptor is None:
+    with contextlib.ExitStack() as held:
+        with writing(name):
+            Path(name).mkdir(parents=True, exist_ok=True)
+            descriptor = None if sys.platform == "win32" else os.open(name, os.O_RDONLY | os.O_CLOEXEC)
+        if descriptor is not None:
+            held.callback(os.close, descriptor)
+            held.enter_context(locked(descriptor, name))
         yield
-        return
-    try:
-        with locked(descriptor, name):
-            yield
-    finally:
-        os.close(descriptor)
 
 
 @contextlib.contextmanager

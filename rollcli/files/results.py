@@ -1,5 +1,6 @@
 """Read and write the rows of a result: CSV, JSON Lines, Parquet (extra `parquet`), and folders of parts."""
 
+import contextlib
 import csv
 import io
 import json
@@ -56,10 +57,8 @@ def encode_parquet(
 
     columns = [(name, _ARROW_TYPES[kind]) for name, kind in types.items()]
     schema = pyarrow.schema(columns, metadata={_RECORD: json.dumps(record).encode()})
-    try:
+    with _of_utf8():
         table = pyarrow.Table.from_pylist(list(rows), schema=schema)
-    except UnicodeEncodeError as error:
-        raise _not_utf8(error) from error
     target = io.BytesIO()
     pyarrow.parquet.write_table(table, target, compression="zstd", version="2.6", write_page_checksum=True)
     return target.getvalue()
@@ -73,16 +72,18 @@ def require_utf8(texts: Iterable[str]) -> None:
     UsageError
         A text is not UTF-8, as a file name need not be.
     """
-    try:
+    with _of_utf8():
         for text in texts:
             text.encode()
+
+
+@contextlib.contextmanager
+def _of_utf8() -> Iterator[None]:
+    try:
+        yield
     except UnicodeEncodeError as error:
-        raise _not_utf8(error) from error
-
-
-def _not_utf8(error: UnicodeEncodeError) -> UsageError:
-    name = error.object.encode("utf-8", "backslashreplace").decode()
-    return UsageError(f"{name}: this name is not UTF-8, which Parquet cannot hold; use CSV")
+        name = error.object.encode("utf-8", "backslashreplace").decode()
+        raise UsageError(f"{name}: this name is not UTF-8, which Parquet cannot hold; use CSV") from error
 
 
 def decode_parquet(data: bytes, name: str) -> Iterator[tuple[int, dict[str, Any]]]:

@@ -426,6 +426,7 @@ class _Sqlite:
 
 
 Bag = _Mcap | _Ros1 | _Sqlite
+_KINDS: dict[bytes, type[Bag]] = {_MCAP: _Mcap, _BAG: _Ros1, _SQLITE: _Sqlite}
 
 
 def open_bag(path: str) -> Bag:
@@ -439,12 +440,9 @@ def open_bag(path: str) -> Bag:
     with reading(path):
         with Path(path).open("rb") as file:
             head = file.read(16)
-        if head.startswith(_MCAP):
-            return _Mcap(path)
-        if head.startswith(_BAG):
-            return _Ros1(path)
-        if head == _SQLITE:
-            return _Sqlite(path)
+        for magic, kind in _KINDS.items():
+            if head.startswith(magic):
+                return kind(path)
     what = "is empty" if not head else "is no ROS 1 bag, MCAP file or sqlite3 bag"
     raise InputError(f"{path}: {what}")
 
