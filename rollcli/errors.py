@@ -115,6 +115,15 @@ def raised_at(error: BaseException) -> TracebackType | None:
 
 
 @contextmanager
+def about(name: str | Path) -> Iterator[None]:
+    """Name the file that is read within the block in front of what is wrong with it."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{name}: {error}", error.code) from error
+
+
+@contextmanager
 def as_usage() -> Iterator[None]:
     """Take what cannot be read for a wrong request, as it is before a run begins."""
     try:

@@ -5,13 +5,14 @@ What a file is, its first bytes say; its name's ending decides nothing.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import InputError, UsageError
+from rollcli.errors import InputError, UsageError, about
 from rollcli.estimator.moments import usable_of
 from rollcli.files.codecs import arrays, pictures, png, tiff
 from rollcli.files.codecs.raw_map import Stored as Stored
@@ -29,13 +30,13 @@ class MapFormat(NamedTuple):
     signatures : tuple of bytes
         What its files begin with.
     decode : callable
-        From bytes, and the name for errors, to `Stored`.
+        From bytes to `Stored`; its errors do not name the file.
     encode : callable
         From an array (H, W), the values that mean no data, and a text, to bytes.
     """
 
     signatures: tuple[bytes, ...]
-    decode: Callable[[bytes, str], Stored]
+    decode: Callable[[bytes], Stored]
     encode: Callable[[NDArray[Any], tuple[float, ...], str], bytes]
 
 
@@ -61,12 +62,15 @@ def read_stored(path: str | Path, name: str | None = None, *, rgb: bool = False)
     """
     name = name or str(path)
     if rgb:
-        return MAP_FORMATS["rgb"].decode(read_bytes(path, name), name)
-    data = read_frame(path, name, begins=_check_beginning)
-    if isinstance(data, bytes):
-        return decode_stored(data, name)
-    require_map_shape(data.shape, name)  # of a recording
-    return Stored(data, "npy")
+        data = read_bytes(path, name)
+        with about(name):
+            return pictures.decode_rgb(data)
+    found = read_frame(path, name, begins=_check_beginning)
+    if isinstance(found, bytes):
+        return decode_stored(found, name)
+    with about(name):
+        require_map_shape(found.shape)  # of a recording
+    return Stored(found, "npy")
 
 
 def decode_stored(data: bytes, name: str) -> Stored:
@@ -89,10 +93,11 @@ def decode_stored(data: bytes, name: str) -> Stored:
     InputError
         Not such a file, truncated, damaged, not single-channel, or with no real numbers.
     """
-    stored = _decoded(data, name)
-    if stored.values.dtype.kind == "b":
-        raise InputError(f"{name}: holds true and false: that is a mask, not a disparity map")
-    return stored
+    with about(name):
+        stored = _decoded(data)
+        if stored.values.dtype.kind == "b":
+            raise InputError("holds true and false: that is a mask, not a disparity map")
+    return replace(stored, note=stored.note and f"{name} {stored.note}")
 
 
 def encode_stored(
@@ -145,15 +150,16 @@ def decode_image(data: bytes, name: str) -> NDArray[Any]:
     InputError
         No such image, truncated, damaged, or of other numbers.
     """
-    if data.startswith(png.SIGNATURE):
-        return png.picture(data, name)
-    if data.startswith(arrays.MAGIC) and arrays.check_npy(data, len(data), name)[0] in _GREY:
-        return arrays.decode_npy(data, name).values
-    if data.startswith(tiff.SIGNATURES):
-        return tiff.picture(data, name)
-    if data.startswith(pictures.SIGNATURES):
-        return pictures.decode_picture(data, name)
-    raise InputError(f"{name}: is no PNG, JPEG, TIFF, BMP, PGM or PPM file, as camera images are")
+    with about(name):
+        if data.startswith(png.SIGNATURE):
+            return png.picture(data)
+        if data.startswith(arrays.MAGIC) and arrays.check_npy(data, len(data))[0] in _GREY:
+            return arrays.decode_npy(data).values
+        if data.startswith(tiff.SIGNATURES):
+            return tiff.picture(data)
+        if data.startswith(pictures.SIGNATURES):
+            return pictures.decode_picture(data)
+        raise InputError("is no PNG, JPEG, TIFF, BMP, PGM or PPM file, as camera images are")
 
 
 def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:
@@ -164,30 +170,32 @@ def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:
     InputError
         Truncated, damaged, or a JPEG.
     """
-    if data.startswith(png.SIGNATURE):
-        pixels = png.picture(data, name, mask=True)
-    elif data.startswith(pictures.LOSSLESS):
-        pixels = pictures.decode_picture(data, name)
-    elif data.startswith(pictures.SIGNATURES):
-        raise InputError(f"{name}: is a JPEG, whose black is not all 0: save the mask as PNG")
-    else:
-        pixels = _decoded(data, name).values
+    with about(name):
+        if data.startswith(png.SIGNATURE):
+            pixels = png.picture(data, mask=True)
+        elif data.startswith(pictures.LOSSLESS):
+            pixels = pictures.decode_picture(data)
+        elif data.startswith(pictures.SIGNATURES):
+            raise InputError("is a JPEG, whose black is not all 0: save the mask as PNG")
+        else:
+            pixels = _decoded(data).values
     return usable_of(pixels if pixels.ndim == 2 else pixels.max(axis=2))
 
 
 def _check_beginning(head: bytes, size: int, name: str) -> None:
     """Refuse a file that is no map by its first bytes: the rest of it need not be read."""
-    if head.startswith(arrays.MAGIC):
-        arrays.check_npy(head, size, name)
-    elif head.startswith(arrays.MAGICS):
-        arrays.check_pfm(head, size, name)
-    elif not any(head.startswith(each.signatures) for each in MAP_FORMATS.values()):
-        _decoded(head, name)  # which says what it is instead
+    with about(name):
+        if head.startswith(arrays.MAGIC):
+            arrays.check_npy(head, size)
+        elif head.startswith(arrays.MAGICS):
+            arrays.check_pfm(head, size)
+        elif not any(head.startswith(each.signatures) for each in MAP_FORMATS.values()):
+            _decoded(head)  # which says what it is instead
 
 
-def _decoded(data: bytes, name: str) -> Stored:
+def _decoded(data: bytes) -> Stored:
     for each in MAP_FORMATS.values():
         if data.startswith(each.signatures):
-            return each.decode(data, name)
+            return each.decode(data)
     hint = "; photographs are given by --left and --right" if data.startswith(pictures.SIGNATURES) else ""
-    raise InputError(f"{name}: is no PNG, TIFF, NPY, NPZ, PFM or EXR file, as disparity maps are{hint}")
+    raise InputError(f"is no PNG, TIFF, NPY, NPZ, PFM or EXR file, as disparity maps are{hint}")

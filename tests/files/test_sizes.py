@@ -129,7 +129,7 @@ def test_a_file_is_read_up_to_the_limit_and_no_further(monkeypatch, name):
 def claim(width, height, pixel_bytes, stored, *, mask=False):
     """What is said of a claim; empty where it is believed."""
     try:
-        raw_map.require_decoded_fits(width, height, pixel_bytes, stored, "x", mask=mask)
+        raw_map.require_decoded_fits(width, height, pixel_bytes, stored, mask=mask)
     except InputError as error:
         return str(error)
     return ""
@@ -143,11 +143,11 @@ def claim(width, height, pixel_bytes, stored, *, mask=False):
 def test_the_limits_are_those_that_the_readme_states(pixel_bytes, most, always):
     assert claim(most, 1, pixel_bytes, 2**40) == claim(always, 1, pixel_bytes, 1) == ""
     assert claim(most + 1, 1, pixel_bytes, 2**40) == (
-        f"x: its header claims {most + 1} x 1 pixels, 513 MB once decoded; "
+        f"its header claims {most + 1} x 1 pixels, 513 MB once decoded; "
         f"from {2**40} bytes up to 512 MB are read"
     )
     assert claim(1, always + 1, pixel_bytes, 1) == (
-        f"x: its header claims 1 x {always + 1} pixels, 33 MB once decoded; "
+        f"its header claims 1 x {always + 1} pixels, 33 MB once decoded; "
         "from 1 bytes up to 32 MB are read; save it uncompressed"
     )
     pixels = 12 * 10**6 * 4 // max(pixel_bytes, 4)

@@ -30,17 +30,17 @@ _REAL = re.compile(r"[<>|=]?[biuf]\d+")
 _UNREAL = {"O": "Python objects (a pickle, which is never loaded)", "c": "complex numbers", "[": "records"}
 
 
-def decode_npy(data: bytes, name: str) -> Stored:
+def decode_npy(data: bytes) -> Stored:
     """Return the array of an .npy file: real numbers or booleans, shape (H, W), any byte and axis order.
 
     (1, H, W) and (H, W, 1), as networks write them, are (H, W).
     """
-    dtype, fortran, shape, start = check_npy(data, len(data), name)
+    dtype, fortran, shape, start = check_npy(data, len(data))
     values = np.frombuffer(data, dtype, count=math.prod(shape), offset=start)
     return Stored(native(values.reshape(shape, order="F" if fortran else "C")), "npy")
 
 
-def check_npy(head: bytes, size: int, name: str) -> tuple[np.dtype[Any], bool, tuple[int, ...], int]:
+def check_npy(head: bytes, size: int) -> tuple[np.dtype[Any], bool, tuple[int, ...], int]:
     """Refuse an array that is no map by its header, of a file of so many bytes.
 
     Returns
@@ -48,16 +48,14 @@ def check_npy(head: bytes, size: int, name: str) -> tuple[np.dtype[Any], bool, t
     tuple
         dtype, Fortran order, shape (H, W), and where the numbers start.
     """
-    dtype, fortran, shape, start = _header(head, name)
+    dtype, fortran, shape, start = _header(head)
     if len(shape) == 3 and 1 in (shape[0], shape[2]):  # the numbers lie as those of (H, W) do
         shape = shape[1:] if shape[0] == 1 else shape[:2]
-    raw_map.require_map_shape(shape, name)
+    raw_map.require_map_shape(shape)
     needed, there = math.prod(shape) * dtype.itemsize, size - start
     if there < needed:
-        raise InputError(
-            f"{name}: is truncated: shape {shape} of {dtype} needs {needed} bytes, {there} are there"
-        )
-    raw_map.require_decoded_fits(shape[1], shape[0], dtype.itemsize, size, name)
+        raise InputError(f"is truncated: shape {shape} of {dtype} needs {needed} bytes, {there} are there")
+    raw_map.require_decoded_fits(shape[1], shape[0], dtype.itemsize, size)
     return dtype, fortran, shape, start
 
 
@@ -68,7 +66,7 @@ def encode_npy(values: NDArray[Any]) -> bytes:
     return b"".join([buffer.getvalue(), values.data])  # write_array copies the numbers twice
 
 
-def decode_npz(data: bytes, name: str) -> Stored:
+def decode_npz(data: bytes) -> Stored:
     """Return the one array of an .npz file, or of several the one named disparity; see `decode_npy`."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -76,21 +74,17 @@ def decode_npz(data: bytes, name: str) -> Stored:
             chosen = held.get(_NAMED) or (next(iter(held.values())) if len(held) == 1 else None)
             if chosen is None:
                 names = ", ".join(each.removesuffix(".npy") for each in list(held)[:5]) or "none"
-                raise InputError(
-                    f"{name}: an NPZ map holds one array, or one of the name disparity; here: {names}"
-                )
+                raise InputError(f"an NPZ map holds one array, or one of the name disparity; here: {names}")
             most = most_unpacked(chosen.compress_size)
             with archive.open(chosen) as file:
                 array = file.read(most + 1)
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, OSError):
-        raise InputError(f"{name}: is a damaged ZIP or NPZ archive") from None
+        raise InputError("is a damaged ZIP or NPZ archive") from None
     if len(array) > most:
-        raise InputError(
-            f"{name}: its array has more than {most >> 20} MB once unpacked; save it uncompressed"
-        )
+        raise InputError(f"its array has more than {most >> 20} MB once unpacked; save it uncompressed")
     if not array.startswith(MAGIC):
-        raise InputError(f"{name}: is a ZIP archive whose {chosen.filename} is no array")
-    return replace(decode_npy(array, name), format="npz")
+        raise InputError(f"is a ZIP archive whose {chosen.filename} is no array")
+    return replace(decode_npy(array), format="npz")
 
 
 def encode_npz(values: NDArray[Any]) -> bytes:
@@ -101,22 +95,22 @@ def encode_npz(values: NDArray[Any]) -> bytes:
     return buffer.getvalue()
 
 
-def _header(data: bytes, name: str) -> tuple[np.dtype[Any], bool, tuple[int, ...], int]:
+def _header(data: bytes) -> tuple[np.dtype[Any], bool, tuple[int, ...], int]:
     """Return dtype, Fortran order, shape, and where the numbers start."""
     width = 2 if data[6:7] == b"\x01" else 4
     start = 8 + width + int.from_bytes(data[8 : 8 + width], "little")
     if len(data) < 8 + width or start > len(data):
-        raise InputError(f"{name}: is truncated within its NPY header")
+        raise InputError("is truncated within its NPY header")
     text = data[8 + width : start][:_MAX_HEADER].decode("latin-1")
     entries = {key: pattern.search(text) for key, pattern in _ENTRIES.items()}
     descr, order, shape = entries["descr"], entries["fortran_order"], entries["shape"]
     if descr is None or order is None or shape is None:
-        raise InputError(f"{name}: its NPY header cannot be read")
+        raise InputError("its NPY header cannot be read")
     sides = tuple(int(side) for side in re.findall(r"\d+", shape[1]))
-    return _real_dtype(descr[1], name), order[1] == "True", sides, start
+    return _real_dtype(descr[1]), order[1] == "True", sides, start
 
 
-def _real_dtype(descr: str, name: str) -> np.dtype[Any]:
+def _real_dtype(descr: str) -> np.dtype[Any]:
     """Return the dtype when it holds real numbers; objects, records, complex numbers, text are refused."""
     if _REAL.fullmatch(descr[1:-1]):
         try:
@@ -125,7 +119,7 @@ def _real_dtype(descr: str, name: str) -> np.dtype[Any]:
             pass
     kind = descr.lstrip("'\"<>|=")[:1]
     what = _UNREAL.get(kind, f"data of type {descr[1:-1][:40]}")
-    raise InputError(f"{name}: holds {what}; a disparity map is a 2-D array of real numbers")
+    raise InputError(f"holds {what}; a disparity map is a 2-D array of real numbers")
 
 
 MAGICS = (b"Pf", b"PF")
@@ -134,14 +128,14 @@ _FLOAT = rb"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?)"
 _HEADER = re.compile(rb"P([fF])" + 2 * (_GAP + rb"(\d{1,9})") + _GAP + _FLOAT + rb"[ \t]*\r?\n")
 
 
-def decode_pfm(data: bytes, name: str) -> Stored:
+def decode_pfm(data: bytes) -> Stored:
     """Return the float32 values of a single-channel PFM file, top row first."""
-    order, width, height, start = check_pfm(data, len(data), name)
+    order, width, height, start = check_pfm(data, len(data))
     rows = np.frombuffer(data, order, count=width * height, offset=start).reshape(height, width)
     return Stored(native(rows[::-1]), "pfm")  # PFM stores the bottom row first
 
 
-def check_pfm(data: bytes, size: int, name: str) -> tuple[str, int, int, int]:
+def check_pfm(data: bytes, size: int) -> tuple[str, int, int, int]:
     """Refuse what is no map by its header, of a file of so many bytes.
 
     Returns
@@ -151,16 +145,14 @@ def check_pfm(data: bytes, size: int, name: str) -> tuple[str, int, int, int]:
     """
     header = _HEADER.match(data, 0, min(len(data), 1000))
     if header is None or float(header[4]) == 0:
-        raise InputError(f"{name}: its PFM header cannot be read (expected: Pf, width height, scale)")
+        raise InputError("its PFM header cannot be read (expected: Pf, width height, scale)")
     if header[1] == b"F":
-        raise InputError(f"{name}: is a colour PFM (PF); a disparity map has one channel (Pf)")
+        raise InputError("is a colour PFM (PF); a disparity map has one channel (Pf)")
     width, height = int(header[2]), int(header[3])
     needed, there = 4 * width * height, size - header.end()
     if there < needed:
-        raise InputError(
-            f"{name}: is truncated: {width} x {height} pixels need {needed} bytes, {there} are there"
-        )
-    raw_map.require_decoded_fits(width, height, 4, size, name)
+        raise InputError(f"is truncated: {width} x {height} pixels need {needed} bytes, {there} are there")
+    raw_map.require_decoded_fits(width, height, 4, size)
     return "<f4" if header[4].startswith(b"-") else ">f4", width, height, header.end()
 
 

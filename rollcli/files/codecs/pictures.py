@@ -28,24 +28,24 @@ MAGIC_EXR = b"\x76\x2f\x31\x01"
 _WINDOW = b"dataWindow\0box2i\0\x10\0\0\0"
 
 
-def decode_picture(data: bytes, name: str) -> NDArray[Any]:
+def decode_picture(data: bytes) -> NDArray[Any]:
     """Return the pixels of a camera image: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
     if data.startswith(_BMP) and any(data[30:34]):  # its run lengths may claim any size
-        raise InputError(f"{name}: is an unusual BMP; those without compression are read")
+        raise InputError("is an unusual BMP; those without compression are read")
     if not data.startswith(LOSSLESS):
-        _require_whole_jpeg(data, name)
+        _require_whole_jpeg(data)
     pixels, printed = decoded_by_opencv(data, PICTURE_FLAGS)
     if pixels is None:
-        raise InputError(f"{name}: is a damaged or truncated image")
+        raise InputError("is a damaged or truncated image")
     if complaint := _complaint(printed):
-        raise InputError(f"{name}: is a damaged JPEG: {complaint}")
+        raise InputError(f"is a damaged JPEG: {complaint}")
     return pixels
 
 
-def _require_whole_jpeg(data: bytes, name: str) -> None:
+def _require_whole_jpeg(data: bytes) -> None:
     """Refuse a JPEG without a frame header or an end, and one that is too large [ITU-T T.81, annex B]."""
     if data.rfind(b"\xff\xd9") < data.rfind(b"\xff\xda"):  # no end of image after the last start of scan
-        raise InputError(f"{name}: is a truncated JPEG")
+        raise InputError("is a truncated JPEG")
     position = 2
     while 0 <= (position := data.find(b"\xff", position)) < len(data) - 9:
         if data[position + 1] == 0xFF:  # fill bytes may stand before a marker
@@ -54,10 +54,10 @@ def _require_whole_jpeg(data: bytes, name: str) -> None:
         marker, length = data[position + 1], int.from_bytes(data[position + 2 : position + 4], "big")
         if marker in _FRAME_HEADERS:
             height, width = (int.from_bytes(data[at : at + 2], "big") for at in (position + 5, position + 7))
-            require_decoded_fits(width, height, data[position + 9], len(data), name)
+            require_decoded_fits(width, height, data[position + 9], len(data))
             return
         position += 2 + (length if marker not in _WITHOUT_LENGTH else 0)
-    raise InputError(f"{name}: is a damaged JPEG: it has no frame header")
+    raise InputError("is a damaged JPEG: it has no frame header")
 
 
 def _complaint(printed: str) -> str:
@@ -105,7 +105,7 @@ def views_of(image: NDArray[Any], layout: str, name: str) -> tuple[NDArray[Any],
     return np.ascontiguousarray(one), np.ascontiguousarray(other)
 
 
-def decode_rgb(data: bytes, name: str) -> Stored:
+def decode_rgb(data: bytes) -> Stored:
     """Return the whole numbers that FoundationStereo writes to the channels of an 8-bit PNG, shape (H, W).
 
     Raises
@@ -113,9 +113,9 @@ def decode_rgb(data: bytes, name: str) -> Stored:
     InputError
         It is no such PNG.
     """
-    pixels = png.picture(data, name) if data.startswith(png.SIGNATURE) else np.empty(0)
+    pixels = png.picture(data) if data.startswith(png.SIGNATURE) else np.empty(0)
     if pixels.ndim != 3 or pixels.dtype != np.uint8:
-        raise InputError(f"{name}: is no RGB PNG of 8 bits, which --encoding foundationstereo reads")
+        raise InputError("is no RGB PNG of 8 bits, which --encoding foundationstereo reads")
     blue, green, red = (pixels[..., each].astype(np.uint32) for each in range(3))
     return Stored((red * _BASE + green) * _BASE + blue, "rgb")
 
@@ -134,7 +134,7 @@ def encode_rgb(values: NDArray[Any]) -> bytes:
     return bytes(cv2.imencode(".png", np.dstack(digits).astype(np.uint8))[1])
 
 
-def decode_exr(data: bytes, name: str) -> Stored:
+def decode_exr(data: bytes) -> Stored:
     """Return the numbers of an OpenEXR file of one channel, where OpenCV was built to read it; shape (H, W).
 
     Raises
@@ -144,17 +144,17 @@ def decode_exr(data: bytes, name: str) -> Stored:
     """
     at = data.find(_WINDOW, 0, 2**16) + len(_WINDOW)
     if at < len(_WINDOW) or at + 16 > len(data):
-        raise InputError(f"{name}: is a damaged EXR: its size cannot be read")
+        raise InputError("is a damaged EXR: its size cannot be read")
     left, top, right, bottom = np.frombuffer(data, "<i4", 4, at).tolist()
-    require_decoded_fits(right - left + 1, bottom - top + 1, 12, len(data), name)
+    require_decoded_fits(right - left + 1, bottom - top + 1, 12, len(data))
     os.environ.setdefault("OPENCV_IO_ENABLE_OPENEXR", "1")  # OpenCV looks at it when it reads the first EXR
     pixels, _ = decoded_by_opencv(data, cv2.IMREAD_UNCHANGED)
     if pixels is None:
-        raise InputError(f"{name}: is damaged, or this OpenCV reads no EXR; save it as TIFF, float32")
+        raise InputError("is damaged, or this OpenCV reads no EXR; save it as TIFF, float32")
     if pixels.ndim == 3 and (pixels == pixels[..., :1]).all():
         pixels = pixels[..., 0]
     if pixels.ndim != 2:
-        raise InputError(f"{name}: is an EXR of {pixels.shape[2]} channels; a disparity map has one")
+        raise InputError(f"is an EXR of {pixels.shape[2]} channels; a disparity map has one")
     return Stored(native(pixels), "exr")
 
 

@@ -177,12 +177,12 @@ class _Header(NamedTuple):
     interlace: int
 
 
-def decode_png(data: bytes, name: str) -> Stored:
+def decode_png(data: bytes) -> Stored:
     """Return the numbers of a single-channel PNG as they are stored, uint8 or uint16, and rollcli's text.
 
     A palette of greys stands for its greys; fully transparent pixels hold no data and become 0.
     """
-    header, bodies, pixels = _decoded(data, name, cv2.IMREAD_UNCHANGED)
+    header, bodies, pixels = _decoded(data, cv2.IMREAD_UNCHANGED)
     transparent = bodies.get(b"tRNS", b"")
     if header.colour == _GREY:
         if header.depth < 8:  # which OpenCV spreads over 0..255
@@ -190,20 +190,20 @@ def decode_png(data: bytes, name: str) -> Stored:
         if transparent:
             pixels[pixels == int.from_bytes(transparent, "big")] = 0
     elif header.colour in (_COLOUR, _COLOUR_ALPHA):
-        raise InputError(f"{name}: is a colour image ({_CHANNELS[header.colour]} channels); {COLOUR_REMEDY}")
+        raise InputError(f"is a colour image ({_CHANNELS[header.colour]} channels); {COLOUR_REMEDY}")
     else:
         grey = np.ascontiguousarray(pixels[..., 0])
         if header.colour == _PALETTE and (pixels[..., :3] != grey[..., None]).any():
-            raise InputError(f"{name}: is a colour image (a palette); {COLOUR_REMEDY}")
+            raise InputError(f"is a colour image (a palette); {COLOUR_REMEDY}")
         if header.colour == _GREY_ALPHA or transparent:
             grey[pixels[..., -1] == 0] = 0
         pixels = grey
     return Stored(pixels, "png", text=bodies.get(_TEXT_KEY, b"").decode("latin-1"))
 
 
-def picture(data: bytes, name: str, *, mask: bool = False) -> NDArray[Any]:
+def picture(data: bytes, *, mask: bool = False) -> NDArray[Any]:
     """Return the pixels of a camera image or mask: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
-    return _decoded(data, name, PICTURE_FLAGS, mask=mask)[-1]
+    return _decoded(data, PICTURE_FLAGS, mask=mask)[-1]
 
 
 def encode_png(values: NDArray[Any], text: str = "") -> bytes:
@@ -218,18 +218,19 @@ def encode_png(values: NDArray[Any], text: str = "") -> bytes:
 
 
 def _decoded(
-    data: bytes, name: str, flags: int, *, mask: bool = False
+    data: bytes, flags: int, *, mask: bool = False
 ) -> tuple[_Header, dict[bytes, bytes], NDArray[Any]]:
     """Return header, further bodies by their kinds, and pixels; InputError if the file is not whole."""
-    header, bodies, image = _chunks(data, name)
+    header, bodies, image = _chunks(data)
     width, height, depth, colour = header[:4]
     packed = b"".join(chunk[8:-4] for chunk in image)
     # what OpenCV takes for a pixel; a palette's colours are spelled out, with their opacity
     pixel_bytes = 4 if colour == _PALETTE else _CHANNELS[colour] * (2 if depth == 16 else 1)
-    require_decoded_fits(width, height, pixel_bytes, len(packed), name, mask=mask)
+    require_decoded_fits(width, height, pixel_bytes, len(packed), mask=mask)
     if height * ((width * depth * _CHANNELS[colour] + 7) // 8) > _MAX_EXPANSION * len(packed):
-        claim = f"its header claims {width} x {height} pixels"
-        raise InputError(f"{name}: {claim}, more than {len(packed)} bytes can hold")
+        raise InputError(
+            f"its header claims {width} x {height} pixels, more than {len(packed)} bytes can hold"
+        )
     if colour == _GREY and depth >= 8 and not header.interlace:
         fast = decode_grey(packed, width, height, depth)
         if fast is not None:
@@ -239,18 +240,18 @@ def _decoded(
     if colour == _PALETTE:
         palette, colours = bodies.get(b"PLTE", b""), 2**depth
         if not palette or len(palette) % 3 or len(palette) > 3 * colours:
-            raise InputError(f"{name}: is a damaged PNG: its palette is missing or wrong")
+            raise InputError("is a damaged PNG: its palette is missing or wrong")
         # with an entry for every number that a pixel can hold
         start.append(_chunk(b"PLTE", palette.ljust(3 * colours, b"\0")))
         if transparent := bodies.get(b"tRNS"):
             start.append(_chunk(b"tRNS", transparent[:colours]))
     pixels, printed = decoded_by_opencv(b"".join([*start, *image, _chunk(b"IEND", b"")]), flags)
     if pixels is None or "libpng" in printed:
-        raise InputError(f"{name}: is a damaged PNG: its pixel data are wrong")
+        raise InputError("is a damaged PNG: its pixel data are wrong")
     return header, bodies, pixels
 
 
-def _chunks(data: bytes, name: str) -> tuple[_Header, dict[bytes, bytes], list[memoryview]]:
+def _chunks(data: bytes) -> tuple[_Header, dict[bytes, bytes], list[memoryview]]:
     """Return what decides the pixels: the header, bodies of palette and transparency, and chunks of the data.
 
     Among the bodies is the text that rollcli wrote beside them.
@@ -261,34 +262,34 @@ def _chunks(data: bytes, name: str) -> tuple[_Header, dict[bytes, bytes], list[m
     while kind != b"IEND":
         end = position + 12 + int.from_bytes(view[position : position + 4], "big")
         if end > len(data) or position + 12 > len(data):
-            raise InputError(f"{name}: is a truncated PNG: it ends after {len(data)} bytes")
+            raise InputError(f"is a truncated PNG: it ends after {len(data)} bytes")
         if zlib.crc32(view[position + 4 : end - 4]) != int.from_bytes(view[end - 4 : end], "big"):
-            raise InputError(f"{name}: is a damaged PNG: wrong checksum {position} bytes in")
+            raise InputError(f"is a damaged PNG: wrong checksum {position} bytes in")
         kind, body = data[position + 4 : position + 8], view[position + 8 : end - 4]
         if (header is None) != (kind == b"IHDR"):
-            raise InputError(f"{name}: is a damaged PNG: its header is not first, or not alone")
+            raise InputError("is a damaged PNG: its header is not first, or not alone")
         if kind == b"IDAT":
             image.append(view[position:end])
         elif kind == b"IHDR":
-            header = _header(bytes(body), name)
+            header = _header(bytes(body))
         elif kind in (b"PLTE", b"tRNS"):
             bodies[kind] = bytes(body)
         elif kind == b"tEXt" and not image and body[: len(_TEXT_KEY)] == _TEXT_KEY:
             bodies.setdefault(_TEXT_KEY, bytes(body[len(_TEXT_KEY) :]))
         elif kind != b"IEND" and kind[:1].isupper():
-            raise InputError(f"{name}: is no standard PNG: chunk {kind.decode('latin-1')!r} is unknown")
+            raise InputError(f"is no standard PNG: chunk {kind.decode('latin-1')!r} is unknown")
         position = end
     assert header is not None
     return header, bodies, image
 
 
-def _header(body: bytes, name: str) -> _Header:
+def _header(body: bytes) -> _Header:
     if len(body) != 13:
-        raise InputError(f"{name}: is a damaged PNG: its header has {len(body)} bytes, not 13")
+        raise InputError(f"is a damaged PNG: its header has {len(body)} bytes, not 13")
     header = _Header(*struct.unpack(">IIBBBBB", body))
     sane = header.depth in _DEPTHS.get(header.colour, ()) and header.interlace <= 1
     if not sane or header.compression or header.filtering or max(header[:2]) > _MAX_SIDE:
-        raise InputError(f"{name}: is a damaged PNG: its header makes no sense")
+        raise InputError("is a damaged PNG: its header makes no sense")
     return header
 
 

@@ -43,20 +43,18 @@ class Stored:
     text: str = ""
 
 
-def require_map_shape(shape: tuple[int, ...], name: str) -> None:
+def require_map_shape(shape: tuple[int, ...]) -> None:
     """Refuse anything that is not (H, W) with at least one pixel."""
     if len(shape) != 2:
         colours = len(shape) == 3 and shape[2] in (3, 4)
         hint = "; photographs are given as image files, by --left and --right" if colours else ""
-        raise InputError(
-            f"{name}: is a {len(shape)}-D array of shape {shape}; a disparity map is 2-D (H, W){hint}"
-        )
+        raise InputError(f"is a {len(shape)}-D array of shape {shape}; a disparity map is 2-D (H, W){hint}")
     if 0 in shape:
-        raise InputError(f"{name}: has no pixels (shape {shape})")
+        raise InputError(f"has no pixels (shape {shape})")
 
 
 def require_decoded_fits(
-    width: int, height: int, pixel_bytes: int, stored: int, name: str, *, mask: bool = False
+    width: int, height: int, pixel_bytes: int, stored: int, *, mask: bool = False
 ) -> None:
     """Refuse an image without pixels, or of more memory than any map takes or its file can be worth.
 
@@ -68,19 +66,17 @@ def require_decoded_fits(
         That the decoder takes for each.
     stored : int
         The size of the file, bytes.
-    name : str
-        What errors call it.
     mask : bool
         Nothing is computed from it: it may stand for as much as any file, and masks compress best of all.
     """
     if width < 1 or height < 1:
-        raise InputError(f"{name}: has no pixels ({width} x {height})")
+        raise InputError(f"has no pixels ({width} x {height})")
     needed = width * height * (pixel_bytes if mask else max(pixel_bytes, _FLOAT32))
     limit = _MOST if mask else min(_MOST, max(MOST_SMALL, MOST_EXPANSION * stored))
     hint = "; save it uncompressed" if needed <= _MOST else ""
     if needed > limit:
         raise InputError(
-            f"{name}: its header claims {width} x {height} pixels, {-(-needed // 2**20)} MB once decoded; "
+            f"its header claims {width} x {height} pixels, {-(-needed // 2**20)} MB once decoded; "
             f"from {stored} bytes up to {limit >> 20} MB are read{hint}"
         )
 

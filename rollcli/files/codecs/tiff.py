@@ -167,27 +167,25 @@ _GDAL_NODATA = 42113
 logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
 
-def decode_tiff(data: bytes, name: str) -> Stored:
+def decode_tiff(data: bytes) -> Stored:
     """Return the numbers of a single-channel TIFF file, as they are stored; of several pages the first."""
-    with _first_page(data, name) as (file, page):
+    with _first_page(data) as (file, page):
         if page.samplesperpixel != 1 or page.photometric == _PALETTE:
             what = "a palette" if page.photometric == _PALETTE else f"{page.samplesperpixel} channels"
-            raise InputError(f"{name}: is a colour image ({what}); {COLOUR_REMEDY}")
-        values = native(_pixels(page, data, name)[..., 0])
-        return Stored(values, "tiff", nodata=_nodata(page), note=_note(file, name), text=page.description)
+            raise InputError(f"is a colour image ({what}); {COLOUR_REMEDY}")
+        values = native(_pixels(page, data)[..., 0])
+        return Stored(values, "tiff", nodata=_nodata(page), note=_note(file), text=page.description)
 
 
-def picture(data: bytes, name: str) -> NDArray[Any]:
+def picture(data: bytes) -> NDArray[Any]:
     """Return the pixels of a camera image: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
-    with _first_page(data, name) as (_, page):
+    with _first_page(data) as (_, page):
         colour = page.photometric == _RGB and page.samplesperpixel >= 3
         if not (colour or page.samplesperpixel == 1) or page.photometric == _PALETTE:
-            raise InputError(f"{name}: is neither a grey nor an RGB TIFF")
-        pixels = _pixels(page, data, name)
+            raise InputError("is neither a grey nor an RGB TIFF")
+        pixels = _pixels(page, data)
         if pixels.dtype not in (np.uint8, np.uint16):
-            raise InputError(
-                f"{name}: holds {pixels.dtype} numbers; a camera image has 8 or 16 bits a channel"
-            )
+            raise InputError(f"holds {pixels.dtype} numbers; a camera image has 8 or 16 bits a channel")
         return native(pixels[..., 2::-1] if colour else pixels[..., 0])
 
 
@@ -213,7 +211,7 @@ def encode_tiff(values: NDArray[Any], nodata: tuple[float, ...] = (), descriptio
 
 
 @contextlib.contextmanager
-def _first_page(data: bytes, name: str) -> Iterator[tuple[Any, Any]]:
+def _first_page(data: bytes) -> Iterator[tuple[Any, Any]]:
     """Yield the file and its first page; whatever the tags make one stumble over becomes an InputError."""
     import tifffile  # only those who have TIFF files wait for it
 
@@ -223,23 +221,23 @@ def _first_page(data: bytes, name: str) -> Iterator[tuple[Any, Any]]:
     except InputError:
         raise
     except Exception:  # noqa: BLE001 (tifffile has no one error for damaged tags)
-        raise InputError(f"{name}: is a damaged or truncated TIFF") from None
+        raise InputError("is a damaged or truncated TIFF") from None
 
 
-def _pixels(page: Any, data: bytes, name: str) -> NDArray[Any]:
+def _pixels(page: Any, data: bytes) -> NDArray[Any]:
     """Return the numbers of one page; shape (H, W, channels)."""
     width, height, samples = int(page.imagewidth), int(page.imagelength), int(page.samplesperpixel)
     if int(page.imagedepth) != 1:
-        raise InputError(f"{name}: is a volume of {page.imagedepth} slices, not a 2-D image")
+        raise InputError(f"is a volume of {page.imagedepth} slices, not a 2-D image")
     if page.dtype is None or page.dtype.kind not in "biuf":
-        raise InputError(f"{name}: its pixels are no real numbers")
-    _require_size(page, width, height, data, name)
-    across, down = _part_size(page, name)
+        raise InputError("its pixels are no real numbers")
+    _require_size(page, width, height, data)
+    across, down = _part_size(page)
     chunky = samples == 1 or page.planarconfig == _CHUNKY
     planes = 1 if chunky else samples
     parts = -(-width // across) * -(-height // down) * planes
     if len(page.dataoffsets) != parts:
-        raise InputError(f"{name}: is a damaged TIFF: {len(page.dataoffsets)} parts, not {parts}")
+        raise InputError(f"is a damaged TIFF: {len(page.dataoffsets)} parts, not {parts}")
     shape = (planes, height, width, samples // planes)
     how = f"compression {int(page.compression)}, {page.bitspersample} bits a number"
     try:
@@ -250,40 +248,38 @@ def _pixels(page: Any, data: bytes, name: str) -> NDArray[Any]:
                 page.nodata = _EMPTY
                 values = page.asarray().reshape(shape)
     except DamagedPartError as error:
-        raise InputError(f"{name}: is a damaged TIFF: its compressed data are wrong ({error})") from None
+        raise InputError(f"is a damaged TIFF: its compressed data are wrong ({error})") from None
     except Exception as error:  # noqa: BLE001 (of tifffile, imagecodecs, OpenCV or NumPy)
         missing = isinstance(error, ImportError) or "imagecodecs" in str(error)
         hint = ": pip install imagecodecs" if missing else ""
-        raise InputError(f"{name}: its pixels cannot be decoded ({how}){hint}") from None
+        raise InputError(f"its pixels cannot be decoded ({how}){hint}") from None
     return values[0] if chunky else np.moveaxis(values[..., 0], 0, -1)
 
 
-def _part_size(page: Any, name: str) -> tuple[int, int]:
+def _part_size(page: Any) -> tuple[int, int]:
     """Columns and rows of a strip or tile, pixels."""
     if not page.is_tiled:
         return int(page.imagewidth), min(int(page.rowsperstrip), int(page.imagelength))
     across, down = int(page.tilewidth), int(page.tilelength)
     if across * down > 2 * page.imagewidth * page.imagelength + _LARGE_TILE:
         size = f"{page.imagewidth} x {page.imagelength}"
-        raise InputError(f"{name}: is a damaged TIFF: tiles of {across} x {down} for {size} pixels")
+        raise InputError(f"is a damaged TIFF: tiles of {across} x {down} for {size} pixels")
     return across, down
 
 
-def _require_size(page: Any, width: int, height: int, data: bytes, name: str) -> None:
+def _require_size(page: Any, width: int, height: int, data: bytes) -> None:
     """Refuse parts beyond the file's end, and sizes that the bytes cannot hold."""
     stored = sum(page.databytecounts)
     for offset, count in zip(page.dataoffsets, page.databytecounts, strict=True):
         if offset + count > len(data):
-            raise InputError(f"{name}: is truncated: its pixels end at byte {offset + count} of {len(data)}")
+            raise InputError(f"is truncated: its pixels end at byte {offset + count} of {len(data)}")
     samples = int(page.samplesperpixel)
-    require_decoded_fits(width, height, samples * page.dtype.itemsize, len(data), name)
+    require_decoded_fits(width, height, samples * page.dtype.itemsize, len(data))
     if not all(page.databytecounts):
         return  # a sparse file: parts without a place hold no data [GDAL]
     needed = width * height * samples * int(page.bitspersample) // 8
     if needed > _MAX_EXPANSION.get(int(page.compression), needed) * stored:
-        raise InputError(
-            f"{name}: its header claims {width} x {height} pixels, more than {stored} bytes can hold"
-        )
+        raise InputError(f"its header claims {width} x {height} pixels, more than {stored} bytes can hold")
 
 
 def _nodata(page: Any) -> tuple[float, ...]:
@@ -295,9 +291,9 @@ def _nodata(page: Any) -> tuple[float, ...]:
         return ()
 
 
-def _note(file: Any, name: str) -> str:
+def _note(file: Any) -> str:
     """Return what to tell a user who gave several pages."""
     with contextlib.suppress(IndexError):  # there is but one
         if not int(file.pages[1].subfiletype) & _NOT_A_PAGE_OF_ITS_OWN:
-            return f"{name} holds several pages; the first is read"
+            return "holds several pages; the first is read"
     return ""

@@ -10,7 +10,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from rollcli.errors import InputError, UsageError, as_usage
+from rollcli.errors import InputError, UsageError, about, as_usage
 from rollcli.files.naming import Input, listed, natural_key, split_position
 from rollcli.files.recordings import messages
 from rollcli.files.recordings.bags import Message, Topic, opened
@@ -80,7 +80,7 @@ def maps_of_bag(files: Sequence[str], name: str, topic: str | None) -> BagFrames
     stated = 0.0
     for each in found.frames[chosen] if topics[chosen].type == DISPARITY else ():
         with contextlib.suppress(InputError):  # a damaged one says so in its row
-            stated = messages.baseline_of(topics[chosen], _message(each.location).data, chosen)
+            stated = messages.baseline_of(topics[chosen], _message(each.location).data)
             break
     if stated < 0 and right is None:
         bag.notes.append(f"{name}: {chosen} states a baseline T of {stated:g} m: taken as {-stated:g} m")
@@ -188,17 +188,18 @@ def read_frame(path: str, member: str, name: str) -> bytes | NDArray[Any]:
     topic = bag.topics.get(topic_name)
     if topic is None:
         raise InputError(f"{name}: no such topic in {path}")
-    if not place:
+    searched = not place
+    if searched:
         place = _index(path, topic_name).get(stamp, ())
-        if len(place) == 4 and messages.is_map(topic, bag.read((place[0], place[1])).data, name):
-            place = place[:2]  # depth maps, too, may be called image_raw
     if not place:
         raise InputError(f"{name}: no such frame in {path}")
-    raw_of = None
-    if len(place) == 4:
-        message = bag.read((place[2], place[3]))
-        raw_of = messages.camera_info(Topic(message.topic, CAMERA_INFO, topic.encoding), message.data, name)
-    return messages.content_of(topic, bag.read((place[0], place[1])).data, name, raw_of)
+    data, raw_of = bag.read((place[0], place[1])).data, None
+    info = bag.read((place[2], place[3])) if len(place) == 4 else None
+    with about(name):
+        # depth maps, too, may be called image_raw
+        if info is not None and not (searched and messages.is_map(topic, data)):
+            raw_of = messages.camera_info(Topic(info.topic, CAMERA_INFO, topic.encoding), info.data)
+        return messages.content_of(topic, data, raw_of)
 
 
 @lru_cache(maxsize=2)  # for names without a place, such as those of a result that is drawn
@@ -222,8 +223,8 @@ def _topics(files: Iterable[str]) -> dict[str, Topic]:
 def _known(topics: dict[str, Topic], topic: str, name: str) -> Topic:
     if topic not in topics:
         raise UsageError(f"{name}: has no topic {topic}; {_all(topics)}")
-    with as_usage():
-        messages.check_decoder(topics[topic], name)
+    with as_usage(), about(name):
+        messages.check_decoder(topics[topic])
     return topics[topic]
 
 
@@ -260,7 +261,7 @@ def _first_encodings(files: Sequence[str], topics: dict[str, Topic], images: set
         for message in opened(path).messages(images):
             if message.topic not in found:
                 with contextlib.suppress(InputError):  # the next one may be whole
-                    found[message.topic] = messages.image_encoding(topics[message.topic], message.data, path)
+                    found[message.topic] = messages.image_encoding(topics[message.topic], message.data)
             if len(found) == len(images):
                 return found
     return found
@@ -284,7 +285,7 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
             if (topic := by_name.get(message.topic)) is None:
                 if (path, message.topic) not in places:
                     with contextlib.suppress(InputError):  # the next one says the same
-                        info = messages.camera_info(topics[message.topic], message.data, message.topic)
+                        info = messages.camera_info(topics[message.topic], message.data)
                         cameras.setdefault(message.topic, info)
                         places[path, message.topic] = place
                 continue
@@ -294,7 +295,7 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
             again = f".{seen[name]}" if seen[name] else ""  # a recorder may write a message twice
             if topic.name not in endings:
                 with contextlib.suppress(InputError):  # a damaged one says so in its row
-                    endings[topic.name] = messages.ending_of(topic, bag.read(message.place).data, name)
+                    endings[topic.name] = messages.ending_of(topic, bag.read(message.place).data)
             ending = endings.get(topic.name, ".npy")
             relative = f"{stem}_{stamp}{again.replace('.', '_')}{ending}"
             shown = f"{name}{again}".replace(os.sep, "/")

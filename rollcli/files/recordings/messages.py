@@ -89,7 +89,7 @@ def stamp_of(topic: Topic, data: memoryview, log_time: int) -> int:
     return int(seconds) * 10**9 + int(nanoseconds) or log_time
 
 
-def check_decoder(topic: Topic, name: str) -> None:
+def check_decoder(topic: Topic) -> None:
     """Refuse a topic that no decoder is for.
 
     Raises
@@ -99,36 +99,34 @@ def check_decoder(topic: Topic, name: str) -> None:
     if topic.type not in (DISPARITY, IMAGE, COMPRESSED):
         hint = f": {_AS_VIDEO}" if "Video" in topic.type else ""
         kind = topic.type or "unknown"
-        raise InputError(f"{name}: {topic.name} has messages of the type {kind}, not images of ROS{hint}")
+        raise InputError(f"{topic.name} has messages of the type {kind}, not images of ROS{hint}")
     if topic.encoding not in ("cdr", "ros1"):
         raise InputError(
-            f"{name}: {topic.name} is serialized as {topic.encoding or 'nothing'}; cdr and ros1 are read"
+            f"{topic.name} is serialized as {topic.encoding or 'nothing'}; cdr and ros1 are read"
         )
 
 
-def camera_info(topic: Topic, data: memoryview, name: str) -> CameraInfo:
+def camera_info(topic: Topic, data: memoryview) -> CameraInfo:
     """Decode a CameraInfo."""
-    found = _decoded(topic, data, name)
+    found = _decoded(topic, data)
     keys = "DKRP" if topic.encoding == "ros1" else "dkrp"  # ROS 1 calls them by capitals
     fields = {key.lower(): tuple(map(float, getattr(found, key))) for key in keys}
     return CameraInfo(int(found.width), int(found.height), str(found.distortion_model), **fields)
 
 
-def image_encoding(topic: Topic, data: memoryview, name: str) -> str:
+def image_encoding(topic: Topic, data: memoryview) -> str:
     """Return what the pixels of an Image are; empty for other types."""
-    return str(_decoded(topic, data, name).encoding) if topic.type == IMAGE else ""
+    return str(_decoded(topic, data).encoding) if topic.type == IMAGE else ""
 
 
-def baseline_of(topic: Topic, data: memoryview, name: str) -> float:
+def baseline_of(topic: Topic, data: memoryview) -> float:
     """Return T of a DisparityImage, m, of the sign that it has there; 0 where it is not stated."""
-    found = _decoded(topic, data, name)
+    found = _decoded(topic, data)
     length = float(found.T if topic.encoding == "ros1" else found.t)
     return length if math.isfinite(length) else 0.0
 
 
-def content_of(
-    topic: Topic, data: memoryview, name: str, raw_of: CameraInfo | None = None
-) -> bytes | NDArray[Any]:
+def content_of(topic: Topic, data: memoryview, raw_of: CameraInfo | None = None) -> bytes | NDArray[Any]:
     """Return the pixels of a message, (H, W) or BGR (H, W, 3), or the file that a CompressedImage holds.
 
     Parameters
@@ -136,8 +134,6 @@ def content_of(
     topic : Topic
     data : bytes
         The message as it is serialized.
-    name : str
-        What errors call it.
     raw_of : CameraInfo or None
         The message is a raw view of this camera: it is rectified.
 
@@ -146,71 +142,71 @@ def content_of(
     InputError
         It is damaged, or of a type or pixels that no decoder is for.
     """
-    check_decoder(topic, name)
-    found = _decoded(topic, data, name)
+    check_decoder(topic)
+    found = _decoded(topic, data)
     if topic.type == COMPRESSED:
         packed = bytes(found.data)
         if packed.startswith(_VIDEO_STARTS):
             raise InputError(
-                f"{name}: is a frame of a video (H.264 or H.265), which needs those before it: {_AS_VIDEO}"
+                f"is a frame of a video (H.264 or H.265), which needs those before it: {_AS_VIDEO}"
             )
         if "compressedDepth" in str(found.format):
             head, packed = packed[:12], packed[max(packed.find(png.SIGNATURE), 0) :]
             if _is_quantized(found):
-                return _unquantized(head, packed, name)
+                return _unquantized(head, packed)
         if raw_of is None:
             return packed
         decode = png.picture if packed.startswith(png.SIGNATURE) else pictures.decode_picture
-        return _rectified(decode(packed, name), raw_of, name)
+        return _rectified(decode(packed), raw_of)
     if topic.type == DISPARITY:
-        values = _pixels(found.image, name)
+        values = _pixels(found.image)
         least = float(found.min_disparity)
         below = values < least
         known = np.isfinite(values)  # ZED's are all negative, and NaN where there are none
         if values.ndim == 2 and values.dtype.kind == "f" and below.any() and (known & ~below).any():
             values = np.where(below, np.nan, values).astype(values.dtype)
         return values
-    values = _pixels(found, name)
-    return values if raw_of is None else _rectified(values, raw_of, name)
+    values = _pixels(found)
+    return values if raw_of is None else _rectified(values, raw_of)
 
 
-def ending_of(topic: Topic, data: memoryview, name: str) -> str:
+def ending_of(topic: Topic, data: memoryview) -> str:
     """Return the ending of a file of what a message holds: pixels, or a file of its own."""
-    return ".npy" if topic.type != COMPRESSED or _is_quantized(_decoded(topic, data, name)) else ".png"
+    return ".npy" if topic.type != COMPRESSED or _is_quantized(_decoded(topic, data)) else ".png"
 
 
 def _is_quantized(image: Any) -> bool:
     return str(image.format).startswith("32FC1") and "compressedDepth" in str(image.format)
 
 
-def _unquantized(head: bytes, packed: bytes, name: str) -> NDArray[Any]:
+def _unquantized(head: bytes, packed: bytes) -> NDArray[Any]:
     """Return depths z, m, of a PNG of a / z + b [compressed_depth_image_transport]; no data is NaN."""
     try:
         a, b = struct.unpack("<4xff", head)
     except struct.error:
-        raise InputError(f"{name}: is a damaged compressedDepth message") from None
-    stored = png.picture(packed, name)
+        raise InputError("is a damaged compressedDepth message") from None
+    stored = png.picture(packed)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         depths = np.float32(a) / (stored.astype(np.float32) - np.float32(b))
     return np.where(stored > 0, depths, np.float32(np.nan))
 
 
-def is_map(topic: Topic, data: memoryview, name: str) -> bool:
+def is_map(topic: Topic, data: memoryview) -> bool:
     """Tell whether the pixels of a message can only be disparities or depths."""
-    return topic.type == DISPARITY or image_encoding(topic, data, name) in _ONLY_MAPS
+    return topic.type == DISPARITY or image_encoding(topic, data) in _ONLY_MAPS
 
 
-def _decoded(topic: Topic, data: memoryview, name: str) -> Any:
+def _decoded(topic: Topic, data: memoryview) -> Any:
     decode = _decoder(topic.encoding == "ros1")
     try:
         return decode(data, topic.type.replace("/", "/msg/"))
     except Exception as error:  # noqa: BLE001 (a damaged message fails anywhere in the decoder)
         if bytes(data[:4]) == _ZSTD:
             raise InputError(
-                f"{name}: is compressed by itself (--compression-mode message): rewrite the bag without, "
+                "is compressed by itself (--compression-mode message): rewrite the bag without, "
                 "by ros2 bag convert"
             ) from None
-        raise InputError(f"{name}: is a damaged message of {topic.type}: {type(error).__name__}") from None
+        raise InputError(f"is a damaged message of {topic.type}: {type(error).__name__}") from None
 
 
 @lru_cache(maxsize=2)
@@ -223,7 +219,7 @@ def _decoder(ros1: bool) -> Any:
     return get_typestore(Stores.ROS2_HUMBLE).deserialize_cdr
 
 
-def _pixels(image: Any, name: str) -> NDArray[Any]:
+def _pixels(image: Any) -> NDArray[Any]:
     """Return the pixels of an Image: (H, W), or BGR (H, W, 3); rows may be longer than their pixels."""
     encoding, width, height, step = str(image.encoding), int(image.width), int(image.height), int(image.step)
     bayer, bits = encoding[6:10], encoding[10:]
@@ -232,18 +228,16 @@ def _pixels(image: Any, name: str) -> NDArray[Any]:
     elif encoding in _PIXELS:
         kind, channels = _PIXELS[encoding]
     else:
-        raise InputError(f"{name}: has pixels of the encoding {encoding[:40]!r}, which is not read")
+        raise InputError(f"has pixels of the encoding {encoding[:40]!r}, which is not read")
     dtype = np.dtype(kind).newbyteorder(">" if image.is_bigendian else "<")
     row = width * channels * dtype.itemsize
     if step < row:
-        raise InputError(
-            f"{name}: its rows have {step} bytes, of {row} that {width} pixels of {encoding} need"
-        )
+        raise InputError(f"its rows have {step} bytes, of {row} that {width} pixels of {encoding} need")
     data = np.asarray(image.data, np.uint8)
     needed = step * (height - 1) + row
     if needed > min(data.size, MOST_BYTES):
-        raise InputError(f"{name}: is truncated: {needed} bytes are needed, {data.size} are there")
-    require_decoded_fits(width, height, channels * dtype.itemsize, data.size, name)
+        raise InputError(f"is truncated: {needed} bytes are needed, {data.size} are there")
+    require_decoded_fits(width, height, channels * dtype.itemsize, data.size)
     values: NDArray[Any] = np.ndarray((height, width * channels), dtype, data, strides=(step, dtype.itemsize))
     values = values.astype(dtype.newbyteorder("="), copy=False)
     values = np.ascontiguousarray(values)  # of any alignment: a message lies anywhere in its chunk
@@ -253,12 +247,10 @@ def _pixels(image: Any, name: str) -> NDArray[Any]:
     return cv2.cvtColor(values, _BAYER[bayer]) if encoding.startswith("bayer_") else values
 
 
-def _rectified(values: NDArray[Any], info: CameraInfo, name: str) -> NDArray[Any]:
+def _rectified(values: NDArray[Any], info: CameraInfo) -> NDArray[Any]:
     if values.shape[:2] != (info.height, info.width):
         seen = f"{values.shape[1]}x{values.shape[0]}"
-        raise InputError(
-            f"{name}: is a raw view of {seen}, and its CameraInfo is of {info.width}x{info.height}"
-        )
+        raise InputError(f"is a raw view of {seen}, and its CameraInfo is of {info.width}x{info.height}")
     wrong = ""
     if any(info.d) and info.model not in ("", *_MODELS):
         wrong = f"the distortion model {info.model[:40]!r}; known are {', '.join(_MODELS)}"
@@ -270,7 +262,7 @@ def _rectified(values: NDArray[Any], info: CameraInfo, name: str) -> NDArray[Any
         except cv2.error:
             wrong = f"{len(info.d)} numbers of distortion, which are no {info.model:.40}"
     if wrong:
-        raise InputError(f"{name}: is a raw view whose CameraInfo has {wrong}")
+        raise InputError(f"is a raw view whose CameraInfo has {wrong}")
     return cv2.remap(values, columns, rows, cv2.INTER_LINEAR)
 
 

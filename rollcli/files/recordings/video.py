@@ -19,7 +19,7 @@ from typing import Any, BinaryIO, NamedTuple
 import cv2
 from numpy.typing import NDArray
 
-from rollcli.errors import InputError, UsageError, as_usage
+from rollcli.errors import InputError, UsageError, about, as_usage
 from rollcli.files.bounded import state_of
 from rollcli.files.codecs.pictures import half_size
 from rollcli.files.codecs.raw_map import require_decoded_fits
@@ -144,7 +144,8 @@ class _Decoder:
         sides = (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
         self.width, self.height = (int(self._capture.get(side)) for side in sides)
         size = Path(self._path).stat().st_size
-        require_decoded_fits(self.width, self.height, 3, size, self._name)
+        with about(self._name):
+            require_decoded_fits(self.width, self.height, 3, size)
 
     def grab(self) -> bool:
         """Decode the next frame; return whether there is one."""

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from rollcli.errors import InputError
-from rollcli.files.codecs.pictures import decode_picture
 from rollcli.files.codecs.png import decoding
+from rollcli.files.formats import decode_image
 from tests.run_cli import python
 
 IMAGE = cv2.GaussianBlur(np.random.default_rng(0).integers(0, 256, (120, 160), dtype=np.uint8), (0, 0), 2)
@@ -18,10 +18,10 @@ READ = (
     "import sys\n"
     "from rollcli.errors import InputError\n"
     "from rollcli.files.codecs.png import silence_decoders\n"
-    "from rollcli.files.codecs.pictures import decode_picture\n"
+    "from rollcli.files.formats import decode_image\n"
     "silence_decoders()\n"
     "try:\n"
-    "    print(decode_picture(sys.stdin.buffer.read(), 'x.jpg').shape)\n"
+    "    print(decode_image(sys.stdin.buffer.read(), 'x.jpg').shape)\n"
     "except InputError as error:\n"
     "    print(error)\n"
 )
@@ -54,14 +54,14 @@ def test_a_jpeg_that_claims_more_than_it_can_be_worth_is_refused_undecoded(progr
     lying = whole[:place] + struct.pack(">HH", 65500, 65500) + whole[place + 4 :]
 
     with pytest.raises(InputError, match="claims 65500 x 65500 pixels"):
-        decode_picture(lying, "x.jpg")
+        decode_image(lying, "x.jpg")
 
 
 def test_fill_bytes_before_a_marker_are_read_over():
     place = WHOLE.index(b"\xff\xc0")
 
     np.testing.assert_array_equal(
-        decode_picture(WHOLE[:place] + b"\xff\xff" + WHOLE[place:], "x.jpg"), decode_picture(WHOLE, "x.jpg")
+        decode_image(WHOLE[:place] + b"\xff\xff" + WHOLE[place:], "x.jpg"), decode_image(WHOLE, "x.jpg")
     )
 
 
@@ -69,15 +69,15 @@ def test_fill_bytes_before_a_marker_are_read_over():
 def test_every_kind_of_frame_says_its_size_and_that_is_counted(marker):
     shortest = b"\xff\xd8\xff" + bytes([marker]) + struct.pack(">HBHHB", 11, 8, 65500, 65400, 1)
     with pytest.raises(InputError, match=r"x.jpg: its header claims 65400 x 65500 pixels"):
-        decode_picture(shortest, "x.jpg")
+        decode_image(shortest, "x.jpg")
     with pytest.raises(InputError, match="no frame header"):
-        decode_picture(shortest[:-1], "x.jpg")
+        decode_image(shortest[:-1], "x.jpg")
 
 
 def test_a_scan_without_an_end_is_truncated():
     for data in (WHOLE[:-2], WHOLE + b"\xff\xda" + bytes(20)):
         with pytest.raises(InputError, match=r"^x.jpg: is a truncated JPEG$"):
-            decode_picture(data, "x.jpg")
+            decode_image(data, "x.jpg")
 
 
 TALK = """

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from rollcli.errors import InputError
-from rollcli.files.codecs.pictures import decode_picture
-from rollcli.files.formats import decode_stored
+from rollcli.files.formats import decode_image, decode_stored
 from tests.binary_files import disparity_map, make_npy
 from tests.run_cli import error_of
 
@@ -52,7 +51,7 @@ def rows_of(pixels, bits):
 
 
 def refusal(data):
-    return error_of(InputError, decode_picture, data, "x")
+    return error_of(InputError, decode_image, data, "x")
 
 
 @pytest.mark.parametrize("size", [40, 108, 124])
@@ -67,7 +66,7 @@ def test_bitmaps_are_read_from_the_bottom_up_or_from_the_top_down(bits, width, s
     downwards = bmp(width, -3, bits, rows_of(pixels[::-1], bits), size=size, between=b"gap.")
 
     for data in (upwards, downwards, upwards + b"more"):
-        np.testing.assert_array_equal(decode_picture(data, "x"), expected)
+        np.testing.assert_array_equal(decode_image(data, "x"), expected)
     for data in (upwards, downwards):
         assert refusal(data[:-1]) == "x: is a damaged or truncated image"
 

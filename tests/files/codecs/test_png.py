@@ -8,8 +8,7 @@ import pytest
 
 from rollcli.errors import InputError
 from rollcli.files.codecs import png
-from rollcli.files.codecs.png import picture
-from rollcli.files.formats import decode_stored
+from rollcli.files.formats import decode_image, decode_stored
 from tests.binary_files import disparity_map, flipped, make_png, png_file, png_header, png_rows
 from tests.run_cli import error_of
 
@@ -22,7 +21,7 @@ def test_an_orientation_tag_does_not_turn_a_camera_image():
     turned = b"Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"
     values = values_of(8)
 
-    assert picture(make_png(values, 8, extra=[(b"eXIf", turned[6:])]), "x").shape == values.shape
+    assert decode_image(make_png(values, 8, extra=[(b"eXIf", turned[6:])]), "x").shape == values.shape
 
 
 # files that are wrong although each checksum is right: what libpng would print about
@@ -113,7 +112,7 @@ def numbers(depth, *shape):
 @pytest.mark.parametrize("colour", [2, 6])
 def test_colours_of_a_camera_image_are_read_in_the_order_of_opencv(colour, depth, interlace):
     pixels = numbers(depth, 13, 9, CHANNELS[colour])
-    found = picture(make_png(pixels, depth, colour, interlace), "x")
+    found = decode_image(make_png(pixels, depth, colour, interlace), "x")
     np.testing.assert_array_equal(found, pixels[..., 2::-1])
 
 
@@ -127,7 +126,7 @@ def test_interlaced_images_of_any_size_are_read(depth):
 
 
 def refusal(*chunks):
-    return error_of(InputError, picture, png_file(*chunks), "x")
+    return error_of(InputError, decode_image, png_file(*chunks), "x")
 
 
 @pytest.mark.parametrize("colour", range(9))
@@ -153,7 +152,7 @@ def test_a_side_has_at_most_a_million_pixels(turned):
         return png_header(*size, 1), (b"IDAT", zlib.compress(rows)), END
 
     shape = (1_000_000, 1) if turned else (1, 1_000_000)
-    assert picture(png_file(*parts(1_000_000)), "x").shape == shape
+    assert decode_image(png_file(*parts(1_000_000)), "x").shape == shape
     assert refusal(*parts(1_000_001)) == "x: is a damaged PNG: its header makes no sense"
 
 
@@ -174,7 +173,7 @@ def test_a_palette_has_at_most_a_colour_for_each_number(depth):
         said = refusal(header, (b"PLTE", bytes(length)), data, END)
         assert said == "x: is a damaged PNG: its palette is missing or wrong"
     for length in (3, most):
-        assert picture(png_file(header, (b"PLTE", bytes(length)), data, END), "x").shape[:2] == (3, 5)
+        assert decode_image(png_file(header, (b"PLTE", bytes(length)), data, END), "x").shape[:2] == (3, 5)
 
 
 def test_a_row_of_an_interlaced_image_with_a_filter_that_does_not_exist_is_refused():

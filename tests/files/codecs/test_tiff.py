@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from rollcli.errors import InputError
-from rollcli.files.codecs.tiff import picture
-from rollcli.files.formats import decode_mask, decode_stored
+from rollcli.files.formats import decode_image, decode_mask, decode_stored
 from tests.binary_files import disparity_map, flipped, make_tiff, tiff_by_tifffile, tiff_of_bits, with_fields
 
 KINDS = ("u1", "u2", "i2", "f2", "f4", "f8")
@@ -136,7 +135,7 @@ def test_colours_lie_side_by_side_or_in_a_plane_each(kind, layout, planes):
     rgb = COLOURS[..., :3].astype(kind) * np.array(np.iinfo(kind).max // 255, kind)
     stored = rgb if planes == "contig" else np.moveaxis(rgb, -1, 0)
 
-    found = picture(tiff_by_tifffile(stored, photometric="rgb", planarconfig=planes, **layout), "x")
+    found = decode_image(tiff_by_tifffile(stored, photometric="rgb", planarconfig=planes, **layout), "x")
 
     assert found.dtype == kind
     np.testing.assert_array_equal(found, rgb[..., ::-1])

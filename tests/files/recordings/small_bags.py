@@ -240,7 +240,7 @@ def _stamps():
 
 
 def _checked(kind, encoding):
-    return made(messages.check_decoder, Topic("/a", kind, encoding), "x.mcap")
+    return made(messages.check_decoder, Topic("/a", kind, encoding))
 
 
 def _image(encoding, width, height, step, size=None, big=False):
@@ -253,7 +253,7 @@ def _image(encoding, width, height, step, size=None, big=False):
 def _content(message, kind=messages.IMAGE, raw_of=None):
     """What a message holds that is decoded already."""
     with mock.patch.object(messages, "_decoded", return_value=message):
-        found = made(messages.content_of, Topic("/a", kind, "cdr"), memoryview(b""), "x", raw_of)
+        found = made(messages.content_of, Topic("/a", kind, "cdr"), memoryview(b""), raw_of)
     if isinstance(found, str):
         return found
     if isinstance(found, bytes):
@@ -284,7 +284,7 @@ def _raw(changes):
 def _of_decoded(function, form="cdr", **fields):
     """What a function makes of a message that is decoded already."""
     with mock.patch.object(messages, "_decoded", return_value=SimpleNamespace(**fields)):
-        return made(function, Topic("/a", messages.IMAGE, form), memoryview(b""), "x")
+        return made(function, Topic("/a", messages.IMAGE, form), memoryview(b""))
 
 
 CASES = {
