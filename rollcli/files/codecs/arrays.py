@@ -21,11 +21,11 @@ MAGIC_NPZ = b"PK\x03\x04"
 _NAMED = "disparity.npy"  # the array of an NPZ that is taken where there are several
 _MAX_HEADER = 10_000
 # Not ast.literal_eval, as NumPy has it: that warns on the terminal, and bounds neither time nor memory
-_ENTRIES = {
-    "descr": re.compile(r"""['"]descr['"]\s*:\s*('[ -&(-~]*'|"[ !#-~]*"|\[)"""),
-    "fortran_order": re.compile(r"""['"]fortran_order['"]\s*:\s*(True|False)\b"""),
-    "shape": re.compile(r"""['"]shape['"]\s*:\s*\(((?:\s*\d{1,18}L?\s*,)*(?:\s*\d{1,18}L?)?)\s*\)"""),
-}
+_ENTRIES = (
+    re.compile(r"""['"]descr['"]\s*:\s*('[ -&(-~]*'|"[ !#-~]*"|\[)"""),
+    re.compile(r"""['"]fortran_order['"]\s*:\s*(True|False)\b"""),
+    re.compile(r"""['"]shape['"]\s*:\s*\(((?:\s*\d{1,18}L?\s*,)*(?:\s*\d{1,18}L?)?)\s*\)"""),
+)
 _REAL = re.compile(r"[<>|=]?[biuf]\d+")
 _UNREAL = {"O": "Python objects (a pickle, which is never loaded)", "c": "complex numbers", "[": "records"}
 
@@ -48,7 +48,16 @@ def check_npy(head: bytes, size: int) -> tuple[np.dtype[Any], bool, tuple[int, .
     tuple
         dtype, Fortran order, shape (H, W), and where the numbers start.
     """
-    dtype, fortran, shape, start = _header(head)
+    width = 2 if head[6:7] == b"\x01" else 4
+    start = 8 + width + int.from_bytes(head[8 : 8 + width], "little")
+    if len(head) < 8 + width or start > len(head):
+        raise InputError("is truncated within its NPY header")
+    text = head[8 + width : start][:_MAX_HEADER].decode("latin-1")
+    descr, order, sides = (pattern.search(text) for pattern in _ENTRIES)
+    if descr is None or order is None or sides is None:
+        raise InputError("its NPY header cannot be read")
+    shape = tuple(int(side) for side in re.findall(r"\d+", sides[1]))
+    dtype = _real_dtype(descr[1])
     if len(shape) == 3 and 1 in (shape[0], shape[2]):  # the numbers lie as those of (H, W) do
         shape = shape[1:] if shape[0] == 1 else shape[:2]
     raw_map.require_map_shape(shape)
@@ -56,7 +65,7 @@ def check_npy(head: bytes, size: int) -> tuple[np.dtype[Any], bool, tuple[int, .
     if there < needed:
         raise InputError(f"is truncated: shape {shape} of {dtype} needs {needed} bytes, {there} are there")
     raw_map.require_decoded_fits(shape[1], shape[0], dtype.itemsize, size)
-    return dtype, fortran, shape, start
+    return dtype, order[1] == "True", shape, start
 
 
 def encode_npy(values: NDArray[Any]) -> bytes:
@@ -93,21 +102,6 @@ def encode_npz(values: NDArray[Any]) -> bytes:
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr(zipfile.ZipInfo(_NAMED), encode_npy(values), zipfile.ZIP_DEFLATED)
     return buffer.getvalue()
-
-
-def _header(data: bytes) -> tuple[np.dtype[Any], bool, tuple[int, ...], int]:
-    """Return dtype, Fortran order, shape, and where the numbers start."""
-    width = 2 if data[6:7] == b"\x01" else 4
-    start = 8 + width + int.from_bytes(data[8 : 8 + width], "little")
-    if len(data) < 8 + width or start > len(data):
-        raise InputError("is truncated within its NPY header")
-    text = data[8 + width : start][:_MAX_HEADER].decode("latin-1")
-    entries = {key: pattern.search(text) for key, pattern in _ENTRIES.items()}
-    descr, order, shape = entries["descr"], entries["fortran_order"], entries["shape"]
-    if descr is None or order is None or shape is None:
-        raise InputError("its NPY header cannot be read")
-    sides = tuple(int(side) for side in re.findall(r"\d+", shape[1]))
-    return _real_dtype(descr[1]), order[1] == "True", sides, start
 
 
 def _real_dtype(descr: str) -> np.dtype[Any]:

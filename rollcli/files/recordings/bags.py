@@ -49,7 +49,7 @@ class Message(NamedTuple):
 
     topic: str
     log_time: int
-    place: tuple[int, int]
+    place: tuple[int, ...]
     data: memoryview
 
 
@@ -194,7 +194,7 @@ class _Chunked:
         if damaged >= 0:
             self.broken = f"is damaged or cut off in what begins at byte {damaged} of its {self._size}"
 
-    def read(self, place: tuple[int, int]) -> Message:
+    def read(self, place: tuple[int, ...]) -> Message:
         """Read one message."""
         offset, number = place
         try:
@@ -413,7 +413,7 @@ class _Sqlite:
         needed: int = pages * (size if size > 1 else 65536)
         return Path(self.path).stat().st_size >= needed
 
-    def read(self, place: tuple[int, int]) -> Message:
+    def read(self, place: tuple[int, ...]) -> Message:
         """Read one message."""
         try:
             asked = f"SELECT topic_id, {_TIME}, data FROM messages WHERE id = ?"

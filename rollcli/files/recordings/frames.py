@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError, UsageError, about, as_usage
 from rollcli.files.naming import Input, listed, natural_key, split_position
 from rollcli.files.recordings import messages
-from rollcli.files.recordings.bags import Message, Topic, opened
+from rollcli.files.recordings.bags import Topic, opened
 from rollcli.files.recordings.messages import CAMERA_INFO, COMPRESSED, DISPARITY, IMAGE, CameraInfo
 from rollcli.rig.calibration import Calibration
 
@@ -80,7 +80,7 @@ def maps_of_bag(files: Sequence[str], name: str, topic: str | None) -> BagFrames
     stated = 0.0
     for each in found.frames[chosen] if topics[chosen].type == DISPARITY else ():
         with contextlib.suppress(InputError):  # a damaged one says so in its row
-            stated = messages.baseline_of(topics[chosen], _message(each.location).data)
+            stated = messages.baseline_of(topics[chosen], _message(each.location))
             break
     if stated < 0 and right is None:
         bag.notes.append(f"{name}: {chosen} states a baseline T of {stated:g} m: taken as {-stated:g} m")
@@ -106,7 +106,7 @@ def pairs_of_bag(files: Sequence[str], name: str, left: str, right: str, toleran
     found = _scan(files, [_known(topics, each, name) for each in (left, right)], topics)
     lefts, rights = found.frames[left], found.frames[right]
     bag = BagFrames()
-    partners = nearest([each.stamp for each in lefts], [each.stamp for each in rights], tolerance_ns)
+    pairs = nearest([each.stamp for each in lefts], [each.stamp for each in rights], tolerance_ns)
     for topic in (left, right):
         info, is_raw = found.cameras.get(_beside(topic)), _RAW in topic
         if is_raw and info is not None and info.changes_raw_views:
@@ -119,16 +119,12 @@ def pairs_of_bag(files: Sequence[str], name: str, left: str, right: str, toleran
             ]
         elif is_raw and not (info is not None and info.usable):
             bag.notes.append(f"{topic}: raw views are taken as they are: no CameraInfo with P rectifies them")
-    bag.frames = [(each, rights[at]) for each, at in zip(lefts, partners, strict=True) if at is not None]
-    paired = {at for at in partners if at is not None}
-    for side, alone in (
-        ("left", [each for each, at in zip(lefts, partners, strict=True) if at is None]),
-        ("right", [each for at, each in enumerate(rights) if at not in paired]),
-    ):
-        if alone:
+    bag.frames = [(lefts[one], rights[other]) for one, other in pairs.items()]
+    for side, views, paired in (("left", lefts, {*pairs}), ("right", rights, {*pairs.values()})):
+        if alone := [f"@{each.stamp}" for at, each in enumerate(views) if at not in paired]:
             bag.notes.append(
                 f"{name}: {len(alone)} {side} views have no partner within {tolerance_ns / 1e6:g} ms and "
-                f"are left out: {listed(f'@{each.stamp}' for each in alone)}"
+                f"are left out: {listed(alone)}"
             )
     if not bag.frames and (lefts or rights):
         raise UsageError(
@@ -142,13 +138,13 @@ def pairs_of_bag(files: Sequence[str], name: str, left: str, right: str, toleran
     return bag
 
 
-def nearest(lefts: Sequence[int], rights: Sequence[int], tolerance: int) -> list[int | None]:
-    """Find for each left stamp the nearest right one; both must be each other's nearest.
+def nearest(lefts: Sequence[int], rights: Sequence[int], tolerance: int) -> dict[int, int]:
+    """Find the left and right stamps that are each other's nearest.
 
     Returns
     -------
-    list of int or None
-        The position of the right stamp; None where none is within the tolerance.
+    dict of int to int
+        By the position of each left stamp that of the right one, if there is one within the tolerance.
     """
     left_order, right_order = (sorted(range(len(each)), key=each.__getitem__) for each in (lefts, rights))
 
@@ -157,12 +153,12 @@ def nearest(lefts: Sequence[int], rights: Sequence[int], tolerance: int) -> list
         around = [each for each in order[max(at - 1, 0) : at + 1] if abs(stamps[each] - stamp) <= tolerance]
         return min(around, key=lambda each: abs(stamps[each] - stamp), default=None)
 
-    partners: list[int | None] = []
+    pairs = dict[int, int]()
     for place, stamp in enumerate(lefts):
         right = closest(stamp, right_order, rights)
-        back = None if right is None else closest(rights[right], left_order, lefts)
-        partners.append(right if right is not None and back in (place, None) else None)
-    return partners
+        if right is not None and closest(rights[right], left_order, lefts) == place:
+            pairs[place] = right
+    return pairs
 
 
 def read_frame(path: str, member: str, name: str) -> bytes | NDArray[Any]:
@@ -193,8 +189,8 @@ def read_frame(path: str, member: str, name: str) -> bytes | NDArray[Any]:
         place = _index(path, topic_name).get(stamp, ())
     if not place:
         raise InputError(f"{name}: no such frame in {path}")
-    data, raw_of = bag.read((place[0], place[1])).data, None
-    info = bag.read((place[2], place[3])) if len(place) == 4 else None
+    data, raw_of = bag.read(place[:2]).data, None
+    info = bag.read(place[2:]) if len(place) == 4 else None
     with about(name):
         # depth maps, too, may be called image_raw
         if info is not None and not (searched and messages.is_map(topic, data)):
@@ -233,10 +229,8 @@ def _decodable(topics: dict[str, Topic], kind: str) -> list[Topic]:
 
 
 def _all(topics: dict[str, Topic]) -> str:
-    if not topics:
-        return "it has no topics"
     some = sorted(f"{each.name} ({each.type})" for each in topics.values())
-    return f"its topics: {listed(some, most=20)}"
+    return f"its topics: {listed(some, most=20) or 'none'}"
 
 
 def _only_map_topic(files: Sequence[str], topics: dict[str, Topic], name: str) -> str:
@@ -361,6 +355,5 @@ def _rectified(found: _Found, topic: str, frame: Input) -> Input:
     return frame if place is None else replace(frame, location=f"{frame.location}+{place}")
 
 
-def _message(location: str) -> Message:
-    _, place = split_position(location)
-    return opened(location.partition("#")[0]).read((place[0], place[1]))
+def _message(location: str) -> memoryview:
+    return opened(location.partition("#")[0]).read(split_position(location)[1]).data
