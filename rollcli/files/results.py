@@ -16,7 +16,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, Literal, get_args, get_type_hints
 
-from rollcli.errors import InputError, UsageError
+from rollcli.errors import InputError, UsageError, about
 from rollcli.extras import require_extra
 from rollcli.files.bounded import as_utf8
 from rollcli.files.storage import STREAM, list_names, read_bytes, read_named
@@ -86,7 +86,7 @@ def _of_utf8() -> Iterator[None]:
         raise UsageError(f"{name}: this name is not UTF-8, which Parquet cannot hold; use CSV") from error
 
 
-def decode_parquet(data: bytes, name: str) -> Iterator[tuple[int, dict[str, Any]]]:
+def decode_parquet(data: bytes) -> Iterator[tuple[int, dict[str, Any]]]:
     """Yield the number (from 1) and the values of each row.
 
     Raises
@@ -105,29 +105,27 @@ def decode_parquet(data: bytes, name: str) -> Iterator[tuple[int, dict[str, Any]
         file = pyarrow.parquet.ParquetFile(io.BytesIO(data), page_checksum_verification=True)
         claimed = sum(file.metadata.row_group(group).total_byte_size for group in range(file.num_row_groups))
         if claimed > allowed:
-            raise InputError(
-                f"{name}: claims {claimed} bytes of values in {len(data)}; no result has so many"
-            )
+            raise InputError(f"claims {claimed} bytes of values in {len(data)}; no result has so many")
         for column in file.schema_arrow:
             if pyarrow.types.is_dictionary(column.type):  # a few bytes of it can stand for gigabytes
-                raise InputError(f"{name}: its column {column.name} is a dictionary; write plain values")
+                raise InputError(f"its column {column.name} is a dictionary; write plain values")
         for batch in file.iter_batches(_ROWS_AT_ONCE):
             allowed -= max(batch.nbytes, _ROW_BYTES * batch.num_rows)
             if allowed < 0:
-                raise InputError(f"{name}: its {len(data)} bytes hold more values than any result")
+                raise InputError(f"its {len(data)} bytes hold more values than any result")
             for values in batch.to_pylist():
                 number += 1
                 yield number, values
         if number != file.metadata.num_rows:
-            raise InputError(f"{name}: is damaged: it has {number} of {file.metadata.num_rows} rows")
+            raise InputError(f"is damaged: it has {number} of {file.metadata.num_rows} rows")
     except (pyarrow.ArrowException, OSError, ValueError, OverflowError) as error:
-        raise InputError(f"{name}: is damaged: {' '.join(str(error).split())[:200]}") from error
+        raise InputError(f"is damaged: {' '.join(str(error).split())[:200]}") from error
 
 
 REQUIRED = ("file", "status", "roll_deg")  # columns that every result has
 
 
-def csv_rows(stream: Iterable[str], path: str | Path) -> Iterator[tuple[int, list[str]]]:
+def _csv_rows(stream: Iterable[str]) -> Iterator[tuple[int, list[str]]]:
     """Yield the header and then each line of a result, with its number; all have the header's length.
 
     Raises
@@ -140,21 +138,19 @@ def csv_rows(stream: Iterable[str], path: str | Path) -> Iterator[tuple[int, lis
         header = next(lines, [])
         missing = [name for name in REQUIRED if name not in header]
         if missing:
-            raise InputError(
-                f"{path}: is not a result of rollcli estimate: it has no column {', '.join(missing)}"
-            )
+            raise InputError(f"is not a result of rollcli estimate: it has no column {', '.join(missing)}")
         yield lines.line_num, header
         width = len(header)
         for line in lines:
             if len(line) == width:
                 yield lines.line_num, line
             elif line:
-                raise InputError(f"{path}: line {lines.line_num}: {len(line)} values for {width} columns")
+                raise InputError(f"line {lines.line_num}: {len(line)} values for {width} columns")
     except csv.Error as error:
-        raise InputError(f"{path}: line {lines.line_num}: is not CSV: {error}") from error
+        raise InputError(f"line {lines.line_num}: is not CSV: {error}") from error
 
 
-def json_rows(lines: Iterable[str], path: str | Path) -> Iterator[tuple[int, dict[str, Any]]]:
+def _json_rows(lines: Iterable[str]) -> Iterator[tuple[int, dict[str, Any]]]:
     """Yield the values of each line of a result in JSON Lines, with its number.
 
     Raises
@@ -168,10 +164,10 @@ def json_rows(lines: Iterable[str], path: str | Path) -> Iterator[tuple[int, dic
         try:
             values = json.loads(line)
         except (ValueError, RecursionError) as error:
-            raise InputError(f"{path}: line {number}: is not JSON: {error}") from error
+            raise InputError(f"line {number}: is not JSON: {error}") from error
         missing = [name for name in REQUIRED if not isinstance(values, dict) or name not in values]
         if missing:
-            raise InputError(f"{path}: line {number}: is no row of rollcli estimate: no {', '.join(missing)}")
+            raise InputError(f"line {number}: is no row of rollcli estimate: no {', '.join(missing)}")
         yield number, values
 
 
@@ -402,38 +398,17 @@ def pieces_of(path: str) -> Iterator[tuple[str, bytes]]:
         raise InputError(f"{path}: is a folder without parts of a result, such as part-00000.parquet")
 
 
-def cells_of(data: bytes, name: str, wanted: Sequence[str]) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
-    """Parse the bytes of a result, which errors call `name`.
-
-    Parameters
-    ----------
-    data : bytes
-        CSV, JSON Lines or Parquet, which the first bytes tell.
-    name : str
-    wanted : sequence of str
-        Columns; those that are not there are left out.
-
-    Returns
-    -------
-    list of str, iterator of tuple
-        The columns that are there; and for each row where it stands ("line 7"), and their cells.
-
-    Raises
-    ------
-    InputError
-        They are no result; the line is named.
-    """
+def _cells_of(data: bytes, wanted: Sequence[str]) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
+    """Return those of the wanted columns that are there; for each row where it stands, and their cells."""
     if data.startswith(MAGIC):
-        table = decode_parquet(data, name)
+        table = decode_parquet(data)
         return list(wanted), ((f"row {number}", *map(values.get, wanted)) for number, values in table)
-    data = as_utf8(data, name)
     # decoded piece by piece: as one text, a million rows would take a gigabyte more
     stream = io.BytesIO(data)
     if data[:_MOST_SPACE].lstrip().startswith(b"{"):
-        texts = (line.removesuffix(b"\n").decode(**TEXT) for line in stream)
-        rows = json_rows(texts, name)
+        rows = _json_rows(line.removesuffix(b"\n").decode(**TEXT) for line in stream)
         return list(wanted), ((f"line {number}", *map(values.get, wanted)) for number, values in rows)
-    lines = csv_rows(io.TextIOWrapper(stream, TEXT["encoding"], TEXT["errors"], newline=""), name)
+    lines = _csv_rows(io.TextIOWrapper(stream, TEXT["encoding"], TEXT["errors"], newline=""))
     _, header = next(lines)
     there = [column for column in wanted if column in header]
     pick = itemgetter(*map(header.index, there))
@@ -599,14 +574,31 @@ def read_columns(path: str, wanted: Sequence[str]) -> ResultColumns:
 
 
 def _values_of(data: bytes, path: str, wanted: Sequence[str]) -> Iterator[dict[str, list[Any]]]:
-    """Yield the values of columns by their names, of some rows at a time; see `cells_of`."""
-    names, rows = cells_of(data, path, wanted)
-    while chunk := list(islice(rows, _CHUNK)):
-        lines, *columns = zip(*chunk, strict=True)
-        yield {name: _values(name, cells, lines, path) for name, cells in zip(names, columns, strict=True)}
+    """Yield the values of columns by their names, of some rows at a time.
+
+    Parameters
+    ----------
+    data : bytes
+        CSV, JSON Lines or Parquet, which the first bytes tell.
+    path : str
+        What errors call it.
+    wanted : sequence of str
+        Columns; those that are not there are left out.
+
+    Raises
+    ------
+    InputError
+        They are no result; the line is named.
+    """
+    data = as_utf8(data, path)
+    with about(path):
+        names, rows = _cells_of(data, wanted)
+        while chunk := list(islice(rows, _CHUNK)):
+            lines, *columns = zip(*chunk, strict=True)
+            yield {name: _values(name, cells, lines) for name, cells in zip(names, columns, strict=True)}
 
 
-def _values(name: str, cells: Sequence[Any], lines: Sequence[str], path: str) -> list[Any]:
+def _values(name: str, cells: Sequence[Any], lines: Sequence[str]) -> list[Any]:
     """Convert the cells of a column, which are texts of CSV or values of JSON."""
     read, found = READERS[name], list[Any]()
     try:
@@ -617,5 +609,5 @@ def _values(name: str, cells: Sequence[Any], lines: Sequence[str], path: str) ->
         value, line = cells[len(found)], lines[len(found)]
         what = f"status: {', '.join(STATUSES)}" if name == "status" else f"value for {name}"
         shown = "" if value is None else value
-        raise InputError(f"{path}: {line}: {shown!r:.80} is no {what}") from error
+        raise InputError(f"{line}: {shown!r:.80} is no {what}") from error
     return found

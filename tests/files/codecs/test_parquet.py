@@ -23,7 +23,7 @@ def written(**columns):
 
 
 def refusal(data):
-    return error_of(InputError, list, decode_parquet(data, "x"))
+    return error_of(InputError, list, decode_parquet(data))
 
 
 @pytest.mark.slow
@@ -32,7 +32,7 @@ def test_values_damaged_anywhere_are_refused_or_read_the_same():
     footer = whole[-8 - int.from_bytes(whole[-8:-4], "little") :]  # has no checksum
     for broken in every_region(whole.removesuffix(footer)):
         try:
-            rows = list(decode_parquet(broken + footer, "x"))
+            rows = list(decode_parquet(broken + footer))
         except InputError:
             continue
         assert rows == list(enumerate(ROWS[:20], 1))
@@ -43,13 +43,13 @@ def test_a_table_with_fewer_rows_than_it_says_is_damaged(monkeypatch):
     whole = parquet.ParquetFile.iter_batches
     monkeypatch.setattr(parquet.ParquetFile, "iter_batches", lambda *args: [next(whole(*args))])
 
-    assert refusal(data) == "x: is damaged: it has 1000 of 2500 rows"
+    assert refusal(data) == "is damaged: it has 1000 of 2500 rows"
 
 
 def test_text_that_is_not_utf8_is_refused():
     latin = pyarrow.array([b"caf\xe9.png"]).view(pyarrow.string())
 
-    assert refusal(written(file=latin)).startswith("x: is damaged: ")
+    assert refusal(written(file=latin)).startswith("is damaged: ")
 
 
 @pytest.mark.parametrize(
@@ -67,7 +67,7 @@ def test_few_bytes_that_hold_many_values_are_refused(column):
 def test_a_text_that_stands_for_many_is_refused():
     repeated = pyarrow.array(["x" * 1000] * 10).dictionary_encode()
 
-    assert refusal(written(file=repeated)) == "x: its column file is a dictionary; write plain values"
+    assert refusal(written(file=repeated)) == "its column file is a dictionary; write plain values"
 
 
 def test_many_equal_rows_take_few_bytes_and_are_read():
@@ -75,7 +75,7 @@ def test_many_equal_rows_take_few_bytes_and_are_read():
     data = encode_parquet(column_types(), [row] * 100_000, {})
 
     assert len(data) * 200 < 100_000 * 200  # less than the share that the bytes of a large file allow
-    assert sum(1 for _ in decode_parquet(data, "x")) == 100_000
+    assert sum(1 for _ in decode_parquet(data)) == 100_000
 
 
 def test_a_name_that_is_not_utf8_is_refused_with_what_to_do():
