@@ -8,7 +8,7 @@ import re
 import stat
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
@@ -225,18 +225,15 @@ def remove_leftovers(paths: Iterable[str | Path]) -> None:
     Each folder is listed once. A file that a live process is still writing is left alone, and so is whatever
     is no regular file.
     """
-    listed: dict[str, dict[str, list[str]]] = {}
+    parts_in = cache(_parts_in)
     for path in paths:
         if is_url(str(path)):  # objects are whole or not there
             continue
         folder, name = os.path.split(path)
-        if folder not in listed:
-            listed[folder] = _parts_in(folder)
-        if listed[folder]:
-            for part in listed[folder].pop(_marker(name), ()):
-                with contextlib.suppress(OSError), nobody_writes(part) as abandoned:
-                    if abandoned:
-                        Path(part).unlink()
+        for part in parts_in(folder).pop(_marker(name), ()):
+            with contextlib.suppress(OSError), nobody_writes(part) as abandoned:
+                if abandoned:
+                    Path(part).unlink()
 
 
 @contextlib.contextmanager

@@ -284,9 +284,8 @@ def _require_size(page: Any, width: int, height: int, data: bytes) -> None:
 
 def _nodata(page: Any) -> tuple[float, ...]:
     """GDAL's no-data tag, a number as text."""
-    tag = page.tags.get(_GDAL_NODATA)
     try:
-        return () if tag is None else (float(str(tag.value).strip("\0 ")),)
+        return (float(str(page.tags.valueof(_GDAL_NODATA, "")).strip("\0 ")),)
     except ValueError:
         return ()
 
