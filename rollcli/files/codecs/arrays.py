@@ -61,9 +61,8 @@ def check_npy(head: bytes, size: int) -> tuple[np.dtype[Any], bool, tuple[int, .
     if len(shape) == 3 and 1 in (shape[0], shape[2]):  # the numbers lie as those of (H, W) do
         shape = shape[1:] if shape[0] == 1 else shape[:2]
     raw_map.require_map_shape(shape)
-    needed, there = math.prod(shape) * dtype.itemsize, size - start
-    if there < needed:
-        raise InputError(f"is truncated: shape {shape} of {dtype} needs {needed} bytes, {there} are there")
+    needed = math.prod(shape) * dtype.itemsize
+    raw_map.require_bytes(f"shape {shape} of {dtype} needs", needed, size - start)
     raw_map.require_decoded_fits(shape[1], shape[0], dtype.itemsize, size)
     return dtype, order[1] == "True", shape, start
 
@@ -143,9 +142,8 @@ def check_pfm(data: bytes, size: int) -> tuple[str, int, int, int]:
     if header[1] == b"F":
         raise InputError("is a colour PFM (PF); a disparity map has one channel (Pf)")
     width, height = int(header[2]), int(header[3])
-    needed, there = 4 * width * height, size - header.end()
-    if there < needed:
-        raise InputError(f"is truncated: {width} x {height} pixels need {needed} bytes, {there} are there")
+    needed = 4 * width * height
+    raw_map.require_bytes(f"{width} x {height} pixels need", needed, size - header.end())
     raw_map.require_decoded_fits(width, height, 4, size)
     return "<f4" if header[4].startswith(b"-") else ">f4", width, height, header.end()
 

@@ -53,6 +53,12 @@ def require_map_shape(shape: tuple[int, ...]) -> None:
         raise InputError(f"has no pixels (shape {shape})")
 
 
+def require_bytes(what: str, needed: int, there: int) -> None:
+    """Refuse a file that has fewer bytes than `what` ("3 x 2 pixels need")."""
+    if there < needed:
+        raise InputError(f"is truncated: {what} {needed} bytes, {there} are there")
+
+
 def require_decoded_fits(
     width: int, height: int, pixel_bytes: int, stored: int, *, mask: bool = False
 ) -> None:

@@ -126,17 +126,12 @@ def read_object(url: str, most: int = MOST_BYTES) -> tuple[bytes, str]:
     """
     store, key = _open(url)
 
-    counted = False
-
     def fetch() -> tuple[bytes, str]:
-        nonlocal counted
         answer = store.get(key)
         meta = answer.meta  # which some versions no longer tell once the bytes are taken
         if meta["size"] > most:
             raise too_large(public_name(url), meta["size"], most, within_seconds(request_seconds()))
-        if not counted:
-            wait_for_room(meta["size"])
-            counted = True
+        wait_for_room(meta["size"])
         return bytes(answer.bytes()), meta["e_tag"] or ""
 
     limits = f" ({request_seconds():g}), for up to {in_words(most)}"
@@ -267,8 +262,7 @@ def _listed(store: Any, prefix: str | None) -> Iterator[Any]:
 
     def page() -> Any:
         nonlocal pages
-        if pages is None:
-            pages = iter(store.list(prefix, offset=last, chunk_size=_PAGE))
+        pages = pages or iter(store.list(prefix, offset=last, chunk_size=_PAGE))
         try:
             return next(pages, ())
         except Exception:
