@@ -132,14 +132,15 @@ def pair_inputs(
     elif not len(lefts) == len(rights) == 1:
         return _by_name(lefts, rights)
     pairs = list(zip(lefts, rights, strict=True))
-    for one, other in pairs:
-        if one.path.name == other.path.name and _place(one) == _place(other):
+    for one, here, there in zip(lefts, _places(lefts), _places(rights), strict=True):
+        if here == there:
             raise UsageError(f"{one.name}: is given by --left and by --right; {_OTHER_SIDE}")
     return pairs
 
 
 def _by_name(lefts: list[Input], rights: list[Input]) -> list[tuple[Input, Input]]:
-    same_files = {_place(each) for each in lefts} & {_place(each) for each in rights}
+    places = _places(lefts), _places(rights)
+    same_files = {*places[0]} & {*places[1]}
     matched, ambiguous = match_names(
         [each.relative for each in lefts], [each.relative for each in rights], marked=bool(same_files)
     )
@@ -147,9 +148,10 @@ def _by_name(lefts: list[Input], rights: list[Input]) -> list[tuple[Input, Input
         rivals = [side[i].name for side, some in zip((lefts, rights), ambiguous, strict=True) for i in some]
         raise UsageError(f"{', '.join(rivals)}: more than one partner; rename them, or use --match order")
     pairs = [(lefts[i], rights[j]) for i, j in matched]
-    paired = {_place(each) for pair in pairs for each in pair}
-    alone = list(dict.fromkeys(each.name for each in (*lefts, *rights) if _place(each) not in paired))
-    if not pairs and set(map(_place, lefts)) == same_files:
+    paired = {side[at] for pair in matched for side, at in zip(places, pair, strict=True)}
+    every = zip((*lefts, *rights), (*places[0], *places[1]), strict=True)
+    alone = list(dict.fromkeys(each.name for each, place in every if place not in paired))
+    if not pairs and {*places[0]} == same_files:
         raise UsageError(
             f"--left and --right name the same images, and no name has a mark of its side (such as left and "
             f"right, L1 and R1): {listed(each.name for each in lefts)}; {_OTHER_SIDE}"
@@ -161,8 +163,10 @@ def _by_name(lefts: list[Input], rights: list[Input]) -> list[tuple[Input, Input
     return pairs
 
 
-def _place(each: Input) -> Path:
-    return Path(os.path.realpath(each.path.parent), each.path.name)
+def _places(inputs: Iterable[Input]) -> list[tuple[str, str]]:
+    """Return the folder that each input really lies in, and its name there."""
+    real = functools.cache(os.path.realpath)  # one folder holds thousands of files
+    return [(real(folder), name) for folder, name in (os.path.split(each.location) for each in inputs)]
 
 
 def _arguments(inputs: Iterable[str], files_from: str | None) -> Iterator[tuple[str, bool]]:

@@ -4,7 +4,6 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 from typing import TypeVar
 
 Key = TypeVar("Key")
@@ -44,11 +43,6 @@ class Input:
     name: str
     relative: str
     stamp: int = 0
-
-    @property
-    def path(self) -> Path:
-        """Where it is; made when asked for, since a path takes ten times the memory of its text."""
-        return Path(self.location)
 
 
 def split_position(location: str) -> tuple[str, tuple[int, ...]]:
