@@ -153,7 +153,7 @@ def atomic_file(path: str | Path, *, durable: bool = False, replaces: bool = Tru
     path : str or Path
         The target; parent folders are made. An existing file or link is replaced in one step.
     durable : bool
-        Survives a power cut once the block has ended. For many files `durable.sync_files` is cheaper.
+        Survives a power cut once the block has ended. For many files `sync_files` is cheaper.
     replaces : bool
         Whether an existing file or link is replaced; otherwise it stays as it is.
 

@@ -96,8 +96,7 @@ def bag_files(location: str) -> list[str]:
     if not is_file(os.path.join(location, "metadata.yaml")):  # noqa: PTH118
         return []
     names = sorted(os.listdir(location), key=natural_key)  # noqa: PTH208
-    packed = [name for name in names if name.lower().endswith((".db3.zstd", ".mcap.zstd"))]
-    if packed:
+    if packed := [name for name in names if name.lower().endswith((".db3.zstd", ".mcap.zstd"))]:
         raise UsageError(f"{location}: its file {packed[0]} is compressed as a whole; unpack it by zstd -d")
     return [f"{location.rstrip('/')}/{name}" for name in names if name.lower().endswith(BAGS)]
 

@@ -140,9 +140,24 @@ _Head = tuple[Literal["messages", "itself"] | None, int, str, int]
 
 
 class _Chunked:
-    """A file of chunks that hold messages; subclasses know how records look, and at which byte they start."""
+    """A file of chunks that hold messages; subclasses know how records look, and at which byte they start.
+
+    Attributes
+    ----------
+    start : int
+        Where the records start.
+    _index : callable
+        Returns where topics are listed behind the messages; 0 where they are not.
+    _head : callable
+        Takes a record, where the file stands, up to what it holds.
+    _message : callable
+        Takes a record up to a message's bytes: its channel, log time and length; None: another record.
+    """
 
     start: int
+    _index: Callable[[], int]
+    _head: Callable[[], _Head]
+    _message: Callable[[_Source], tuple[int, int, int] | None]
 
     def __init__(self, path: str) -> None:
         self.path, self.broken = path, ""
@@ -250,18 +265,6 @@ class _Chunked:
                     found.append((channel, time, data))
             whole = source.size == size
         return _Records(found, after, whole, source.at_once)
-
-    def _index(self) -> int:
-        """Return where topics are listed behind the messages; 0 where they are not."""
-        raise NotImplementedError
-
-    def _head(self) -> _Head:
-        """Take a record, where the file stands, up to what it holds."""
-        raise NotImplementedError
-
-    def _message(self, source: _Source) -> tuple[int, int, int] | None:
-        """Take a record up to a message's bytes: its channel, log time and length; None: another record."""
-        raise NotImplementedError
 
 
 class _Mcap(_Chunked):
