@@ -20,7 +20,7 @@ from rollcli.errors import InputError, UsageError, as_usage, reading
 from rollcli.files.atomic import is_file, is_folder
 from rollcli.files.bounded import most_unpacked, state_of, too_large
 from rollcli.files.naming import natural_key, split_position
-from rollcli.files.stores.locations import is_url, require_local
+from rollcli.files.stores.locations import base_name, is_url, require_local
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -102,12 +102,14 @@ def bag_files(location: str) -> list[str]:
 
 
 def refuse_packed(location: str) -> None:
-    """Refuse an archive whose members cannot be read one by one.
+    """Refuse an archive whose members cannot be read one by one, as those of one in a store.
 
     Raises
     ------
     UsageError
     """
+    if is_archive(base_name(location)):
+        require_local(location, "archives are read from local disk: download it first")
     if location.lower().endswith(_PACKED):
         raise UsageError(
             f"{location}: its members cannot be read one by one; unpack it, or pack it as .zip or .tar"

@@ -16,14 +16,7 @@ from pathlib import Path
 from rollcli.errors import UsageError, reading
 from rollcli.files.atomic import is_file, is_folder, mode_of
 from rollcli.files.containers import file_of, frame_name, is_archive, members, refuse_packed
-from rollcli.files.stores.locations import (
-    base_name,
-    is_object_url,
-    is_url,
-    public_name,
-    require_local,
-    split_url,
-)
+from rollcli.files.stores.locations import base_name, is_object_url, is_url, public_name, split_url
 from rollcli.files.stores.objects import has_objects, list_objects
 
 MAP_ENDINGS = (".png", ".tif", ".tiff", ".npy", ".npz", ".pfm", ".exr")
@@ -280,8 +273,7 @@ class Search:
         """Yield the objects behind a URL: one, or those of a prefix or pattern that are readable."""
         pattern = not literal and is_object_url(url) and glob.has_magic(url)
         if not pattern and (literal or not is_folder_url(url)):
-            if is_archive(base_name(url)):
-                require_local(url, "archives are read from local disk: download it first")
+            refuse_packed(url)
             return self._named(url, base_name(url))
         folder = f"{url.rstrip('/')}/"
         if folder in self._skipped_urls:
