@@ -292,10 +292,9 @@ def _without_plateaus(disparity: NDArray[Any]) -> str:
         return ""
     said = []
     for which, end in (("smallest", np.min), ("largest", np.max)):
-        found = _plateau(few, end)
-        for value in found:
-            disparity[disparity == value] = 0
-        if found:
+        if found := _plateau(few, end):
+            for value in found:
+                disparity[disparity == value] = 0
             share = np.isin(few, found).mean()
             said.append(
                 f"{share:.0%} of the disparities are the {which}, {found[0]:g} px: they are taken as no data"

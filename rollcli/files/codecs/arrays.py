@@ -1,5 +1,6 @@
 """NPY and NPZ files, and portable float maps [http://www.pauldebevec.com/Research/HDR/PFM/]."""
 
+import contextlib
 import io
 import math
 import re
@@ -106,10 +107,8 @@ def encode_npz(values: NDArray[Any]) -> bytes:
 def _real_dtype(descr: str) -> np.dtype[Any]:
     """Return the dtype when it holds real numbers; objects, records, complex numbers, text are refused."""
     if _REAL.fullmatch(descr[1:-1]):
-        try:
+        with contextlib.suppress(TypeError):
             return np.dtype(descr[1:-1])
-        except TypeError:
-            pass
     kind = descr.lstrip("'\"<>|=")[:1]
     what = _UNREAL.get(kind, f"data of type {descr[1:-1][:40]}")
     raise InputError(f"holds {what}; a disparity map is a 2-D array of real numbers")

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
-from rollcli.files.codecs.png import decoding
+from rollcli.files.codecs.png import decoded_by_opencv, decoding
 from rollcli.files.codecs.raw_map import COLOUR_REMEDY, Stored, native, require_decoded_fits
 
 _NONE, _LZW, _DEFLATE, _OLD_DEFLATE, _PACKBITS = 1, 5, 8, 32946, 32773
@@ -101,10 +101,7 @@ def _decoded_picture(compression: int, packed: bytes, width: int, height: int) -
     numbers = width, height, 16, compression, 1, 8 + 2 + 12 * len(_TAGS) + 4, height, len(packed)
     entries = [struct.pack("<HHII", tag, 4, 1, number) for tag, number in zip(_TAGS, numbers, strict=True)]
     file = struct.pack("<4sIH", b"II*\0", 8, len(_TAGS)) + b"".join(entries) + bytes(4) + packed
-    try:
-        return cv2.imdecode(np.frombuffer(file, np.uint8), cv2.IMREAD_UNCHANGED)
-    except cv2.error:  # a size beyond OpenCV's limits
-        return None
+    return decoded_by_opencv(file, cv2.IMREAD_UNCHANGED)[0]
 
 
 def _unpredicted_floats(plain: bytes, rows: int, dtype: np.dtype[Any], samples: int) -> bytes:

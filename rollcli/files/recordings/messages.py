@@ -80,10 +80,8 @@ class CameraInfo:
 def stamp_of(topic: Topic, data: memoryview, log_time: int) -> int:
     """Return the header's time, ns, without decoding the message; the time of recording where it has none."""
     try:
-        if topic.encoding == "ros1":
-            seconds, nanoseconds = struct.unpack_from("<II", data, 4)
-        else:
-            seconds, nanoseconds = struct.unpack_from("<iI" if data[1] & 1 else ">iI", data, 4)
+        form = "<II" if topic.encoding == "ros1" else "<iI" if data[1] & 1 else ">iI"
+        seconds, nanoseconds = struct.unpack_from(form, data, 4)
     except (struct.error, IndexError):
         return log_time
     return int(seconds) * 10**9 + int(nanoseconds) or log_time
