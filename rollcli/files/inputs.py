@@ -181,7 +181,10 @@ def _arguments(inputs: Iterable[str], files_from: str | None) -> Iterator[tuple[
 
 
 def _listed_in(name: str) -> Iterator[str]:
-    """Yield the paths of a list: of a file, an object, or stdin ("-")."""
+    """Yield the paths of a list: of a file, an object, or stdin ("-").
+
+    They stand one a line, or as `find -print0` writes them; bytes, for file names need not be text.
+    """
     with as_usage():
         data = as_utf8(read_named(name, MOST_LISTED, _LIST), name)
     if name == STREAM and data.startswith(_NO_TEXT):
@@ -189,11 +192,6 @@ def _listed_in(name: str) -> Iterator[str]:
             "-: stands for a list of files on stdin, one a line; what came is an image or an archive: name "
             "its file in place of -"
         )
-    return _lines(data)
-
-
-def _lines(data: bytes) -> Iterator[str]:
-    """Split paths, one a line or as `find -print0` writes them; bytes, for file names need not be text."""
     # one after the other: all at once, a list of line ends alone would take ten times its memory
     if b"\0" in data:
         return (os.fsdecode(line[0]) for line in re.finditer(rb"[^\0]+", data))
