@@ -77,6 +77,7 @@ def test_what_a_store_objects_to_is_said_before_any_work(bucket, store, tmp_path
         (["estimate", *VIEWS, "--align", "s3://maps/none.json"], "there is no such object"),
         (["evaluate", "paper", "maps", "-o", "s3://nowhere/p"], "there is no such bucket"),
         (["estimate", "s3://maps/run.zip"], "archives are read from local disk: download it first"),
+        (["estimate", "s3://maps/run.tar.gz"], "its members cannot be read one by one"),
         (["estimate", "https://host/run.tar?key=1"], "host/run.tar: archives are read from local disk"),
         (["estimate", "http://user:word@127.0.0.1:9/a.png"], "are asked without user and password"),
         (["rig", "http://user:word@127.0.0.1:9/rolls.csv"], "are asked without user and password"),
