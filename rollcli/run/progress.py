@@ -9,7 +9,7 @@ import sys
 import time
 from array import array
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from statistics import median
 from typing import Any, NamedTuple
 
@@ -25,9 +25,6 @@ from rollcli.stereo.misalignment import advice_of
 _MOST_FRAMES = 1_000_000  # that the rig's roll is told of: their names and numbers take 150 MB
 
 
-_NO_ANGLE = bytes([STATUSES.index("error")])
-
-
 class Figures(NamedTuple):
     """What the summary takes of consecutive rows.
 
@@ -35,27 +32,24 @@ class Figures(NamedTuple):
     ----------
     status : bytes
         Of each row, its position in `STATUSES`.
-    numbers : mapping of str to array of float
-        Those of `COLUMNS` in which a row has a value; NaN where it has none.
+    numbers : array of float
+        The values of `COLUMNS`, row by row; NaN where a row has none.
     """
 
     status: bytes
-    numbers: "Mapping[str, array[float]]"
+    numbers: "array[float]"
 
     @classmethod
     def of(cls, rows: Sequence[Row]) -> "Figures":
         """Take them of rows."""
-        numbers = {}
-        for name in COLUMNS:
-            values = [getattr(row, name) for row in rows]
-            if any(value is not None for value in values):
-                numbers[name] = array("d", (math.nan if value is None else value for value in values))
+        values = (getattr(row, name) for row in rows for name in COLUMNS)
+        numbers = array("d", (math.nan if value is None else value for value in values))
         return cls(bytes(STATUSES.index(row.status) for row in rows), numbers)
 
     @property
     def first_error(self) -> int:
         """The position of the first row without an angle; -1 where there is none."""
-        return self.status.find(_NO_ANGLE)
+        return self.status.find(STATUSES.index("error"))
 
 
 class RunSummary:
@@ -74,7 +68,7 @@ class RunSummary:
         self._files: list[str] = []
         self._places = array("Q")
         self._status = bytearray()
-        self._numbers = {name: array("d") for name in COLUMNS}
+        self._numbers = array("d")  # see `Figures.numbers`
 
     def add(self, files: Sequence[str], figures: Figures, places: Sequence[int]) -> None:
         """Take rows, which stand at these places of the result, from 0."""
@@ -86,9 +80,7 @@ class RunSummary:
         self._files.extend(files)
         self._places.extend(places)
         self._status.extend(figures.status)
-        missing = array("d", [math.nan]) * len(files)
-        for name, column in self._numbers.items():
-            column.extend(figures.numbers.get(name, missing))
+        self._numbers.extend(figures.numbers)
 
     def add_row(self, row: Row, place: int = 0) -> None:
         """Take a row; those of one place stay in the order in which they come."""
@@ -113,18 +105,16 @@ class RunSummary:
         """The exit status of a run that came to its end."""
         return ExitStatus.FRAMES_FAILED if self.counts["error"] else ExitStatus.DONE
 
-    @property
-    def advice(self) -> str:
-        """What to do about how the views lay, in a sentence; empty where the median is level."""
-        lay = [self._median(name) for name in ALIGNMENT_COLUMNS]
-        return "" if lay[0] is None else advice_of(*(value or 0.0 for value in lay))
-
     def alignment(self) -> dict[str, float | int | str] | None:
-        """Return the medians of how the views lay, for the run's record; None where no pair was measured."""
+        """Return the medians of how the views lay, for the run's record; None where no pair was measured.
+
+        Their `advice` is what to do about it, in a sentence; empty where the median is level.
+        """
         lay = {name: self._median(name) for name in ALIGNMENT_COLUMNS}
         frames = len(self._known(ALIGNMENT_COLUMNS[0]))
         rounded = {name: round(value, 4) + 0.0 for name, value in lay.items() if value is not None}
-        return {"frames": frames, **rounded, "advice": self.advice} if frames else None
+        advice = advice_of(*(value or 0.0 for value in lay.values()))
+        return {"frames": frames, **rounded, "advice": advice} if frames else None
 
     def rig_roll(self) -> str:
         """Return the rig's roll in one line, such as `roll -0.44 ± 0.06°, 5 ok, 0 suspect, 0 failed`."""
@@ -137,8 +127,9 @@ class RunSummary:
 
         order = np.argsort(self._places, kind="stable")
         files, statuses = [self._files[at] for at in order], [STATUSES[self._status[at]] for at in order]
-        numbers = {name: np.asarray(column)[order] for name, column in self._numbers.items()}
-        return one_line(assess_rig({"file": files, "status": statuses, **numbers}))
+        numbers = np.asarray(self._numbers).reshape(-1, len(COLUMNS))[order].T
+        columns = zip(COLUMNS, np.ascontiguousarray(numbers), strict=True)
+        return one_line(assess_rig({"file": files, "status": statuses, **dict(columns)}))
 
     def pose_note(self, calibration: Calibration | None, downscale: float) -> str:
         """Return what the intervals of pitch and height leave out; empty where no frame has a pitch.
@@ -158,7 +149,8 @@ class RunSummary:
         return median(known) if known else None
 
     def _known(self, name: str) -> list[float]:
-        return [each for each in self._numbers[name] if not math.isnan(each)]
+        values = self._numbers[COLUMNS.index(name) :: len(COLUMNS)]
+        return [each for each in values if not math.isnan(each)]
 
 
 _LINE_EVERY_S = 30.0
@@ -394,5 +386,5 @@ class Progress(TaskProgress):
         by_status = [f"{counts[status]} {status}" for status in self._statuses]
         by_status.append(f"{counts['error']} failed")
         self.note(f"{self.frames()}: {', '.join(by_status)}; {self.seconds:.1f} s, {self.speed()}")
-        if advice := self.summary.advice:
+        if advice := (self.summary.alignment() or {}).get("advice"):
             self.note(f"median over the pairs: {advice}")

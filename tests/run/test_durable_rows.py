@@ -50,7 +50,7 @@ def plan_of(folder, count):
 
 def add(output, frame, position, row, line, status="ok"):
     """Add a row and the line of its inputs; an error has no image."""
-    figures = Figures(bytes([STATUSES.index(status)]), {})
+    figures = Figures(bytes([STATUSES.index(status)]), ())
     output.append([position], [frame], Batch(figures, 0, [row], [line], ReadAs(), []))
 
 
