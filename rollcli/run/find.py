@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache, cached_property
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, overload
+from typing import overload
 
 from rollcli.errors import InputError, UsageError
 from rollcli.extras import require_extra
@@ -31,10 +31,6 @@ from rollcli.rig.calibration import Calibration, CalibrationOptions, require_cal
 from rollcli.rig.read_calibration import MAX_BYTES, parse_calibration, with_numbers
 from rollcli.run.frame import Frame
 from rollcli.run.options import EncodingOptions, FrameOptions, FramesOptions, InputOptions, Layout
-
-if TYPE_CHECKING:
-    from rollcli.files.recordings.frames import BagFrames
-
 
 _MARK = "_camera"  # Cityscapes: aachen_000000_000019_camera.json
 
@@ -151,8 +147,8 @@ def calibration_notes(frames: Sequence[Frame]) -> list[str]:
     return list(dict.fromkeys(note for calibration in used for note in calibration.notes))
 
 
-def check_first_size(frames: Iterable[Frame], options: FrameOptions) -> tuple[list[str], Calibration | None]:
-    """Refuse a calibration that is not for the size of the first frame.
+def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> tuple[list[str], Calibration | None]:
+    """Refuse a calibration that is not for the size of the first frame, where that has one.
 
     Returns
     -------
@@ -166,8 +162,8 @@ def check_first_size(frames: Iterable[Frame], options: FrameOptions) -> tuple[li
     UsageError
         So it is; or views side by side seem squeezed, and no calibration says that they are not.
     """
-    first = next((frame for frame in frames if frame.calibration is not None or options.side_by_side), None)
-    if first is None:
+    first = next(iter(frames), None)
+    if first is None or (first.calibration is None and options.side_by_side is None):
         return [], None
     from rollcli.files.formats import read_stored  # only here does a dispatcher decode an image
     from rollcli.run.read import read_views
@@ -254,10 +250,7 @@ def _map_frames(options: FramesOptions) -> Sequence[Frame]:
         raise UsageError("no input: name maps (files, folders, patterns, or - for a list on stdin)")
     make = _FrameMaker(options)
     if bags := _bags(given):
-        from rollcli.files.recordings.frames import maps_of_bag
-
-        found_maps = [maps_of_bag(files, name, given.topic) for name, files in bags]
-        return _bag_frames(found_maps, make, options)
+        return _bag_frames(bags, make, options)
     if given.topic is not None:
         raise UsageError("--topic is of a bag (.bag, .db3, .mcap or a rosbag2 folder), and none is given")
     search = _search(options, MAP_ENDINGS, maps=True)
@@ -331,7 +324,13 @@ def _pair_frames(options: FramesOptions) -> list[Frame]:
         )
     make = _FrameMaker(options)
     if any(views):
-        return _bag_pairs(options, make)
+        if not all(views):
+            raise UsageError("--left-topic and --right-topic are given together")
+        if bags := _bags(given):
+            return _bag_frames(bags, make, options)
+        raise UsageError(
+            "--left-topic and --right-topic are of a bag: name a .bag, .db3, .mcap or rosbag2 folder"
+        )
     videos = VIDEOS if pairs.side_by_side is not None else ()
     search = _search(options, (*IMAGE_ENDINGS, *videos))
     if pairs.side_by_side is not None:
@@ -362,24 +361,11 @@ def _frames_of(left: Input, right: Input, layout: Layout | None) -> list[tuple[I
     return frames_of(left, right, layout)
 
 
-def _bag_pairs(options: FramesOptions, make: "_FrameMaker") -> list[Frame]:
-    left, right = options.topics.left_topic, options.topics.right_topic
-    if left is None or right is None:
-        raise UsageError("--left-topic and --right-topic are given together")
-    bags = _bags(options.inputs)
-    if not bags:
-        raise UsageError(
-            "--left-topic and --right-topic are of a bag: name a .bag, .db3, .mcap or rosbag2 folder"
-        )
-    from rollcli.files.recordings.frames import pairs_of_bag
-
-    tolerance = round(options.topics.sync_tolerance * 1e6)
-    found = [pairs_of_bag(files, name, left, right, tolerance) for name, files in bags]
-    return _bag_frames(found, make, options)
+_Bags = list[tuple[str, list[str]]]  # each with its files
 
 
-def _bags(given: InputOptions) -> list[tuple[str, list[str]]]:
-    """List the bags among the inputs, each with its files; all inputs are bags, or none is.
+def _bags(given: InputOptions) -> _Bags:
+    """List the bags among the inputs; all inputs are bags, or none is.
 
     Raises
     ------
@@ -409,10 +395,18 @@ def _behind(name: str) -> list[str]:
     return sorted(found, key=natural_key) or [name]
 
 
-def _bag_frames(bags: "Iterable[BagFrames]", make: "_FrameMaker", options: FramesOptions) -> list[Frame]:
+def _bag_frames(bags: _Bags, make: "_FrameMaker", options: FramesOptions) -> list[Frame]:
+    from rollcli.files.recordings.frames import maps_of_bag, pairs_of_bag
+
+    left, right, milliseconds = options.topics
+    if left is not None and right is not None:
+        tolerance = round(milliseconds * 1e6)
+        found = [pairs_of_bag(files, name, left, right, tolerance) for name, files in bags]
+    else:
+        found = [maps_of_bag(files, name, options.inputs.topic) for name, files in bags]
     frames: list[Frame] = []
     taken = _each_of(options.inputs.every)
-    for bag in bags:
+    for bag in found:
         known, given = bag.calibration, options.calibration
         _tell([*bag.notes, *([] if given.given else bag.uncalibrated)], options)
         known = None if known is None or given.calib else with_numbers(known, given)

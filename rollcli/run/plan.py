@@ -75,9 +75,7 @@ def make_plan(options: EstimateOptions) -> Plan:
     )
     every, frames = frames, _shard(frames, options.result)
     outputs.check_places(frames, options.folders)
-    calibrated = options.calibration.given or any(frame.calibration for frame in every[:1])
-    checked = calibrated or options.pairs.side_by_side is not None
-    notes, first = check_first_size(every, options.frame) if checked else ([], None)
+    notes, first = check_first_size(every, options.frame)
     further = further_columns(every, first, options)
     if not (options.running.overwrite or options.result.resume):
         outputs.check_nothing_is_there(outputs.files_of(frames, options.writes))
