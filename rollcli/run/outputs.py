@@ -26,8 +26,10 @@ from rollcli.run.options import ENDING_OF_FORMAT, RunningOptions, Written
 
 def possible_paths(frame: Frame, writes: Iterable[Written]) -> Iterator[tuple[str, list[str]]]:
     """Yield the kind of each file of a frame, and the paths of which one is written, the usual one first."""
+    stem = posixpath.splitext(frame.relative)[0]
     for kind, folder, endings in writes if frame.relative else ():
-        yield kind, [output_path(frame, folder, ending) for ending in endings]
+        names = (frame.relative if ending is None else stem + ending for ending in endings)
+        yield kind, [within(folder, name) for name in names]
 
 
 def roomy_path(path: str) -> str:
@@ -41,12 +43,6 @@ def local_files(
     """Yield the files of those frames that have angles which a power cut may take from a local disk."""
     angled = (frame for frame, at in zip(frames, status, strict=True) if STATUSES[at] != "error")
     return itertools.filterfalse(is_url, files_of(angled, writes, root))
-
-
-def output_path(frame: Frame, folder: str, ending: str | None = None) -> str:
-    """Name the file of a frame below `folder`; it keeps the frame's own ending unless one is given."""
-    name = frame.relative if ending is None else posixpath.splitext(frame.relative)[0] + ending
-    return within(folder, name)
 
 
 def every_path(frame: Frame, writes: Iterable[Written], root: str = "") -> list[str]:

@@ -149,7 +149,7 @@ class ClusterExecutor(Generic[Task, Result]):
     def wait(self, future: "ClusterFuture[Task, Result]") -> None:
         """Wait until a chunk is done, or for a fifth of a second."""
         self.check_connection()
-        future.wait(_POLL_S)
+        future.settled.wait(_POLL_S)
 
     def retry(self, chunk: Sequence[Task]) -> Done[Result]:
         """Run a task again whose workers died: Dask blames all that were theirs, the next in line, too."""
@@ -203,12 +203,8 @@ class ClusterFuture(Generic[Task, Result]):
         """Give the chunk to workers that take part."""
         self._tries += 1
         self._sent, self.chosen = self._executor.send(self._chunk, self._priority)
-        settled = self._settled = threading.Event()
+        settled = self.settled = threading.Event()
         self._sent.add_done_callback(lambda _: settled.set())
-
-    def wait(self, timeout: float) -> None:
-        """Wait until the chunk is done, or for so many seconds."""
-        self._settled.wait(timeout)
 
     def done(self) -> bool:
         """Tell whether the result is there."""
