@@ -7,9 +7,9 @@ ones few are. The numbers lie amid the gaps that these files leave
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,29 +23,16 @@ from rollcli.files.formats import Stored
 from rollcli.run.options import FrameOptions
 
 _DIVISORS = (("sgbm", 16), ("kitti", 256))
-
-
-class Remedies(NamedTuple):
-    """What to do about what is no map in pixels, in the words of who is told."""
-
-    depth: str
-    photograph: str
-    encoding: str
-    scale: str
-
-
-COMMAND = Remedies(
-    depth="give --encoding depth and its calibration, such as --calib FILE",
-    photograph="give photographs by --left and --right",
-    encoding="--encoding {name} (stored / {by})",
-    scale="--scale, the pixels that a stored number of 1 stands for",
-)
-PYTHON = Remedies(
-    depth="give focal length times baseline, over the depth",
-    photograph="give both views to rollcli.estimate_pair",
-    encoding="the numbers / {by}",
-    scale="pixels",
-)
+# what to do about what is no map in pixels: at the command line, and in Python
+REMEDIES = {
+    "depth": (
+        "give --encoding depth and its calibration, such as --calib FILE",
+        "give focal length times baseline, over the depth",
+    ),
+    "photograph": ("give photographs by --left and --right", "give both views to rollcli.estimate_pair"),
+    "encoding": ("--encoding {name} (stored / {by})", "the numbers / {by}"),
+    "scale": ("--scale, the pixels that a stored number of 1 stands for", "pixels"),
+}
 _UPSIDE_DOWN = "upside down: reverse the order of its rows"
 
 
@@ -113,7 +100,7 @@ def require_positive(stored: Stored, name: str) -> None:
         )
 
 
-def too_large(disparity: NDArray[Any], stored: Stored, encoding: str, remedies: Remedies = COMMAND) -> str:
+def too_large(disparity: NDArray[Any], stored: Stored, encoding: str, *, python: bool = False) -> str:
     """Say that the disparities cannot be pixels, and what would divide them; empty when they can.
 
     Parameters
@@ -124,8 +111,8 @@ def too_large(disparity: NDArray[Any], stored: Stored, encoding: str, remedies: 
         What the file holds.
     encoding : str
         How it was read.
-    remedies : Remedies
-        `COMMAND` or `PYTHON`.
+    python : bool
+        Whether the words are for a caller in Python.
     """
     width = disparity.shape[1]
     if not disparity.max() > width:
@@ -146,14 +133,14 @@ def too_large(disparity: NDArray[Any], stored: Stored, encoding: str, remedies: 
         (name, by) for name, by in _DIVISORS if name != encoding and near / by <= TUNING.plausible * width
     ]
     if not fitting:
-        return f"{said}: give {remedies.scale}"
+        return f"{said}: give {REMEDIES['scale'][python]}"
     times = " or ".join(str(by) for _, by in fitting)
-    remedy = " or ".join(remedies.encoding.format(name=name, by=by) for name, by in fitting)
+    remedy = " or ".join(REMEDIES["encoding"][python].format(name=name, by=by) for name, by in fitting)
     return f"{said}: the numbers look {times} times too large; give {remedy}"
 
 
 def looks_like(
-    disparity: NDArray[Any], stored: Stored | None, options: FrameOptions, remedies: Remedies = COMMAND
+    disparity: NDArray[Any], stored: Stored | None, options: FrameOptions, *, python: bool = False
 ) -> str:
     """Say what a map without a sure angle looks like instead; empty when it looks like nothing known.
 
@@ -164,10 +151,24 @@ def looks_like(
     stored : Stored or None
         What the file holds; None for a map that was matched from a pair.
     options : FrameOptions
-    remedies : Remedies
-        `COMMAND` or `PYTHON`.
+    python : bool
+        Whether the words are for a caller in Python.
     """
-    return "" if stored is None else next(_likenesses(disparity, stored, options, remedies), "")
+    if stored is None:
+        return ""
+    if _is_photograph(stored.values):
+        return f"looks like a photograph, not a disparity map: {REMEDIES['photograph'][python]}"
+    if _grows_downward(disparity):
+        return ""
+    depth = options.encoding.encoding != Encoding.DEPTH
+    if depth:
+        inverse = np.divide(1, disparity, out=np.zeros_like(disparity), where=disparity > 0)
+        depth = _has_road(inverse, options)
+    reversed_rows = _has_road(disparity[::-1], options)
+    if depth:  # few roads tell which
+        either = f"; or it is {_UPSIDE_DOWN}" if reversed_rows else ""
+        return f"looks like a depth map: {REMEDIES['depth'][python]}{either}"
+    return f"looks {_UPSIDE_DOWN}" if reversed_rows else ""
 
 
 def estimate_or_liken(
@@ -196,26 +197,6 @@ def estimate_or_liken(
         found = likeness()
         raise EstimationError("; ".join(filter(None, [found, str(error)])), found) from error
     return estimate, likeness() if estimate.status != "ok" else ""
-
-
-def _likenesses(
-    disparity: NDArray[Any], stored: Stored, options: FrameOptions, remedies: Remedies
-) -> Iterator[str]:
-    if _is_photograph(stored.values):
-        yield f"looks like a photograph, not a disparity map: {remedies.photograph}"
-    if _grows_downward(disparity):
-        return
-    depth = options.encoding.encoding != Encoding.DEPTH
-    if depth:
-        inverse = np.divide(1, disparity, out=np.zeros_like(disparity), where=disparity > 0)
-        depth = _has_road(inverse, options)
-    reversed_rows = _has_road(disparity[::-1], options)
-    if depth and reversed_rows:  # few roads tell which
-        yield f"looks like a depth map: {remedies.depth}; or it is {_UPSIDE_DOWN}"
-    elif depth:
-        yield f"looks like a depth map: {remedies.depth}"
-    elif reversed_rows:
-        yield f"looks {_UPSIDE_DOWN}"
 
 
 def _is_photograph(values: NDArray[Any]) -> bool:

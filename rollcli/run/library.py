@@ -22,10 +22,10 @@ from rollcli.files.formats import Stored, read_image, read_stored
 from rollcli.files.naming import Input
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import with_pose
-from rollcli.run.diagnosis import PYTHON, estimate_or_liken, looks_like, too_large
+from rollcli.run.diagnosis import REMEDIES, estimate_or_liken, looks_like, too_large
 from rollcli.run.find import given_calibration
 from rollcli.run.options import FrameOptions, MethodOptions
-from rollcli.run.read import matched_source, road_finder
+from rollcli.run.read import Source, matched_source, road_finder
 from rollcli.stereo.options import StereoOptions
 
 
@@ -114,7 +114,8 @@ def estimate_roll(
     rig = given_calibration(calibration)
     values = map_of(disparity)
     if values.ndim == 3 and values.shape[2] in (3, 4):
-        raise UsageError(f"an array of shape {values.shape} is no disparity map: {PYTHON.photograph}")
+        remedy = REMEDIES["photograph"][True]
+        raise UsageError(f"an array of shape {values.shape} is no disparity map: {remedy}")
     if rig is not None and values.ndim == 2:
         request = replace(request, middle=rig.for_size(*values.shape[::-1]).cx)
     like = partial(_likeness, values, seed)
@@ -122,9 +123,8 @@ def estimate_roll(
     beyond = ""
     if rig is not None and (values > values.shape[1]).any():  # most maps need not be read again for this
         # the roll is the same at any scale, pitch and height are not
-        beyond = too_large(*_in_pixels(values), "px", PYTHON)
-    message = "; ".join(filter(None, [likeness, estimate.message, beyond]))
-    estimate = replace(estimate, status="suspect" if beyond else estimate.status, message=message)
+        beyond = too_large(*_in_pixels(values), "px", python=True)
+    estimate = Source(values, doubts={"beyond": beyond}).doubted(estimate, likeness)
     return estimate if rig is None else with_pose(estimate, rig)
 
 
@@ -138,7 +138,7 @@ def _likeness(values: NDArray[Any], seed: int) -> str:
     """Say what an array without a sure angle looks like instead of a map; empty when like nothing known."""
     if values.dtype.kind not in "fiu" or not values.size:
         return ""
-    return looks_like(*_in_pixels(values), FrameOptions(method=MethodOptions(seed=seed)), PYTHON)
+    return looks_like(*_in_pixels(values), FrameOptions(method=MethodOptions(seed=seed)), python=True)
 
 
 def estimate_pair(
@@ -207,8 +207,7 @@ def estimate_pair(
     request = replace(request, slope_error=source.slope_error, middle=None if rig is None else rig.cx)
     with source.doubting():
         estimate = estimator.estimate_roll(source.disparity, request, mask=allowed, road_mask=road_mask)
-    message = "; ".join(filter(None, [estimate.message, source.doubt, source.note]))
-    estimate = replace(estimate, status="suspect" if source.doubt else estimate.status, message=message)
+    estimate = source.doubted(estimate)
     return estimate if rig is None else with_pose(estimate, rig)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError, InputError, UsageError, raised_at
+from rollcli.estimator.estimate import RollEstimate
 from rollcli.estimator.request import Request
 from rollcli.estimator.road.find import Plane, road_plane
 from rollcli.files.codecs.pictures import views_of
@@ -152,6 +153,12 @@ class Source:
     def doubt(self) -> str:
         """All the doubts; empty when there is none."""
         return "; ".join(filter(None, self.doubts.values()))
+
+    def doubted(self, estimate: RollEstimate, likeness: str = "", note: str = "") -> RollEstimate:
+        """Return an estimate whose message has all that the row says; it is suspect where the map is."""
+        said = filter(None, [likeness, estimate.message, self.doubt, self.note, note])
+        status = "suspect" if self.doubt else estimate.status
+        return replace(estimate, status=status, message="; ".join(said))
 
     @contextlib.contextmanager
     def doubting(self) -> Iterator[None]:
@@ -312,6 +319,8 @@ def matched_source(
     match = match_pair(left, right, options, find_road)
     searched = (match.min_disparity, match.min_disparity + match.num_disparities - 1)
     height, width = left.shape[:2]
+    at_end = f"{match.end_fraction:.0%} of the map lies at the end of the searched range"
+    short = f"{at_end}; use a larger --num-disparities" if match.end_fraction > _MUCH_AT_END else ""
     alignment = {}
     if match.lies is not None:  # rounded: a resumed run reads them from its rows
         lies = zip(ALIGNMENT_COLUMNS, match.lies.values(*match.disparity.shape), strict=True)
@@ -320,7 +329,7 @@ def matched_source(
         match.disparity,
         searched=searched,
         slope_error=match.slope_error,
-        doubts={"range": _doubt_of_range(match), "match": match.doubt},
+        doubts={"range": short, "match": match.doubt},
         note=_LACKS_ROAD if match.lacks_road else "",
         alignment=alignment,
         levelled=(round(match.larger, 8), round(match.corrected.rotation, 8)),
@@ -342,13 +351,6 @@ def _road(
         v, u = (np.arange(few) * many // few for few, many in zip(small.shape, allowed.shape, strict=True))
         allowed = allowed[v[:, None], u]
     return road_plane(small, smaller, allowed, request)
-
-
-def _doubt_of_range(match: "StereoMatch") -> str:
-    if match.end_fraction <= _MUCH_AT_END:
-        return ""
-    share = f"{match.end_fraction:.0%} of the map lies at the end of the searched range"
-    return f"{share}; use a larger --num-disparities"
 
 
 _NUMERIC_ERRORS = (ArithmeticError, ValueError)  # from numbers that some step cannot deal with
