@@ -14,9 +14,8 @@ from rollcli.files.naming import listed
 from rollcli.files.results import Row
 from rollcli.files.search import MAP_ENDINGS, objects_behind
 from rollcli.files.stores.locations import base_name, is_remote, is_url, store_of
-from rollcli.run.frame import Frame
+from rollcli.run.frame import Frame, frame_of_row
 from rollcli.run.options import KINDS, FrameOptions, ImageKind, ImageOptions
-from rollcli.run.result_rows import frame_of_row
 from rollcli.simulate.options import TRUTH
 
 JUMP, WIDEST, SUSPECT, SPREAD = "around a jump", "widest interval", "suspect", "evenly spread"

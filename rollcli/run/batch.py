@@ -1,16 +1,19 @@
-"""What a worker hands back of consecutive frames: few bytes, and the rows themselves only if it must.
+"""What workers do with frames, whatever the command, and what they hand back of consecutive ones.
 
-A worker that has all the rows of a part writes it. The others come back as lines, and the dispatcher writes
-them. Import-light: never loads NumPy.
+That is few bytes, and the rows themselves only if it must: a worker that has all the rows of a part writes
+it. The others come back as lines, and the dispatcher writes them. Import-light: a worker alone loads what
+reads, estimates and draws.
 """
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 from rollcli.errors import UsageError
-from rollcli.files.atomic import sync_files
+from rollcli.files.atomic import remove_leftovers, sync_files
+from rollcli.files.containers import file_of
 from rollcli.files.results import (
     Format,
     column_types,
@@ -21,14 +24,63 @@ from rollcli.files.results import (
     run_path,
 )
 from rollcli.files.storage import create, write_bytes
-from rollcli.files.stores.locations import is_url, public_name
+from rollcli.files.stores.locations import is_url, public_name, tasks_in_hand
 from rollcli.files.stores.objects import object_owner
-from rollcli.run.frame import Frame, FrameResult, ReadAs
-from rollcli.run.options import FrameOptions, ResultOptions
-from rollcli.run.outputs import local_files
+from rollcli.run.frame import Frame, FrameResult, ReadAs, failed_frame
+from rollcli.run.options import FrameOptions, FramesOptions, ResultOptions
+from rollcli.run.outputs import every_path, files_of, local_files, write_outputs
 from rollcli.run.progress import Figures
 from rollcli.run.result_file import inputs_line, part_inputs_path
-from rollcli.run.workers.chunks import Span
+from rollcli.run.workers.chunks import Span, Work, Workers
+
+
+def do_frame(frame: Frame, options: FrameOptions) -> FrameResult:
+    """Do the work on a frame, on a worker."""
+    from rollcli.run.frame_task import run_frame
+
+    return run_frame(frame, options)
+
+
+def lost_frame(frame: Frame, reason: str, options: FrameOptions) -> FrameResult:
+    """Make the row of a frame whose worker died, and remove its files of an earlier run."""
+    paths = every_path(frame, options.writes)
+    write_outputs({}, paths, replaces=options.replaces, retry_of=options.retry_of)
+    return failed_frame(frame, reason)
+
+
+def clear_frames(frames: Iterable[Frame], options: FrameOptions) -> None:
+    """Remove the halves of files that a worker left which died amid one of these frames."""
+    if not options.retry_of:  # they go when the row is written, with marks that are needed until then
+        remove_leftovers(files_of(frames, options.writes))
+
+
+def _decode(frame: Frame, options: FrameOptions) -> Frame:
+    from rollcli.run.read import decoded  # loads NumPy, which other runs leave to the workers
+
+    return decoded(frame, options)
+
+
+def work_on(frames: Iterable[Frame], options: FrameOptions, **further: Any) -> Work[Frame, FrameResult]:
+    """Say what is done with frames; `further` are fields of `Work`."""
+    videos = any(frame.of_videos for frame in frames)
+    return Work(
+        partial(do_frame, options=options),
+        partial(lost_frame, options=options),
+        partial(clear_frames, options=options),
+        prepare=partial(_decode, options=options) if videos else None,
+        **further,
+    )
+
+
+def workers_for(frames: Sequence[Frame], options: FramesOptions, parts: Iterable[str] = ()) -> Workers:
+    """Say which workers do the frames, what they write, and what they must see.
+
+    `parts`: the folder of those parts of a result that they write.
+    """
+    files = tuple(file_of(path) for frame in (*frames[:1], *frames[-1:]) for path in frame.reads())
+    folders, running = options.folders, options.running
+    threads = tasks_in_hand((*files, *folders))
+    return Workers(running.jobs, running.scheduler, files, (*folders, *parts), threads)
 
 
 @dataclass(frozen=True)
@@ -101,9 +153,9 @@ class Parts(NamedTuple):
         OutputError
             It cannot be written.
         """
-        location = part_location(self.output, self.form, number)
+        location, inputs = part_paths(self.output, self.form, number)
         check_owned(self.output, self.run)
-        write_bytes(part_inputs_path(self.output, number), b"".join(notes), durable=True)
+        write_bytes(inputs, b"".join(notes), durable=True)
         if not create(location, self.encoded(number, lines), self.run):
             raise UsageError(
                 f"{location}: another run has written this part; give each an --output of its own"
@@ -134,9 +186,9 @@ class Step(NamedTuple):
     retries: bool = False
 
 
-def part_location(output: str, form: Format, number: int) -> str:
-    """Return where a part lies."""
-    return f"{output}/{part_name(number, form)}"
+def part_paths(output: str, form: Format, number: int) -> tuple[str, str]:
+    """Return where a part lies, and where what its rows were made from."""
+    return f"{output}/{part_name(number, form)}", part_inputs_path(output, number)
 
 
 def check_owned(output: str, run: str) -> None:

@@ -1,22 +1,37 @@
-"""`derotate`, `vdisparity`, `heights` and `disparity`: each frame becomes files of its own."""
+"""`derotate`, `vdisparity`, `heights` and `disparity`: each frame becomes files of its own.
 
-from collections.abc import Sequence
+Where they are given a result, each map has its row there.
+"""
+
+import math
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import replace
 
-from rollcli.errors import ExitStatus, UsageError
+from rollcli.errors import ExitStatus, RollcliError, UsageError
 from rollcli.extras import require_extra
-from rollcli.files.results import Row
+from rollcli.files.inputs import is_elsewhere, match_paths
+from rollcli.files.naming import listed
+from rollcli.files.results import Row, read_result, run_path
 from rollcli.messages import say
 from rollcli.run import outputs
-from rollcli.run.find import check_depth, check_first_size, find_frames
-from rollcli.run.frame import Frame
-from rollcli.run.frame_work import work_on, workers_for
-from rollcli.run.options import ConvertOptions, DerotateOptions, HeightsOptions, VDisparityOptions
+from rollcli.run.batch import work_on, workers_for
+from rollcli.run.find import check_depth, check_first_size, find_frames, mask_finder
+from rollcli.run.frame import Frame, located_beside
+from rollcli.run.options import (
+    ConvertOptions,
+    DerotateOptions,
+    FrameOptions,
+    HeightsOptions,
+    VDisparityOptions,
+)
 from rollcli.run.progress import Progress
-from rollcli.run.result_rows import rows_of
+from rollcli.run.resume import recorded_options
 from rollcli.run.workers.interrupt import stop_on_signals
 from rollcli.run.workers.tasks import require_scheduler, run_tasks
+
+_COMPARED = 3  # maps in other folders than their rows': the first, the last and one between
+_SAME_DEG = 1e-4  # a result holds angles to a millionth of a degree
 
 
 def run_conversion(options: ConvertOptions) -> ExitStatus:
@@ -89,13 +104,91 @@ def _check_options(options: ConvertOptions) -> None:
 def _find_rows(frames: Sequence[Frame], options: ConvertOptions) -> Sequence[Row | None]:
     if options.result is None:
         return [None] * len(frames)
-    quiet, skip_suspect = options.running.quiet, options.skip_suspect
-    every_row = not isinstance(options, VDisparityOptions)
-    rows = rows_of(frames, options.result, quiet=quiet, skip_suspect=skip_suspect, every_row=every_row)
+    rows = _rows_of(frames, options.result, options)
     metric = isinstance(options, HeightsOptions) and any(row.height_m is not None for row in rows)
-    if metric and not quiet and any(frame.calibration is None for frame in frames):
+    if metric and not options.running.quiet and any(frame.calibration is None for frame in frames):
         say(
             f"{options.result}: was made with a calibration: give it with --calib to have heights in metres, "
             "not camera heights"
         )
     return rows
+
+
+def _rows_of(frames: Sequence[Frame], result: str, options: ConvertOptions) -> list[Row]:
+    """Find the row of each frame, and say how many angles are suspect, and whether they are used.
+
+    Frames and rows are compared by path as far as they agree. Where folders differ, names do not tell a copy
+    from another drive: some of these maps are estimated again, and have to give the angles of their rows.
+
+    Raises
+    ------
+    UsageError
+        Names maps without a row, rows that have an angle but no map where all maps are to be converted, and
+        what matches more than one; a row is of another drive; or every angle is suspect, and such are left
+        out.
+    """
+    read = read_result(result)
+    rows = read.rows
+    found = match_paths([frame.file for frame in frames], [row.file for row in rows], result)
+    alone = [frame.file for frame, at in zip(frames, found, strict=True) if at is None]
+    if alone:
+        raise UsageError(f"{result}: has no row for {listed(alone)}")
+    used = [at for at in found if at is not None]
+    lost = [rows[at] for at in sorted(set(range(len(rows))).difference(used))]
+    angled = [row.file for row in lost if row.roll_deg is not None]
+    if angled and not isinstance(options, VDisparityOptions):
+        raise UsageError(f"{result}: no map is given for its rows of {listed(angled)}")
+    matched = [rows[at] for at in used]
+    elsewhere = [
+        (frame, row)
+        for frame, row in zip(frames, matched, strict=True)
+        if row.roll_deg is not None and is_elsewhere(frame.file, row.file, of_pair=bool(row.right_file))
+    ]
+    if elsewhere:
+        recorded = recorded_options(read.run, run_path(result))
+        mask_of = _masks_of(recorded, result)
+        for at in {round(i * (len(elsewhere) - 1) / (_COMPARED - 1)): None for i in range(_COMPARED)}:
+            frame, row = elsewhere[at]
+            if not _is_copy(replace(frame, mask=mask_of(row.file)), row, recorded):
+                differ = f"its row is of {row.file}, and not of {frame.file}"
+                raise UsageError(f"{result}: {differ}: give the result of these maps")
+    _tell_suspects(matched, options)
+    return matched
+
+
+def _masks_of(recorded: FrameOptions, result: str) -> Callable[[str], str | None]:
+    """Find the masks of a result's run, without which its maps have other angles."""
+    mask = recorded.region.mask
+    try:
+        return mask_finder(mask and located_beside(mask, result))
+    except UsageError as error:
+        raise UsageError(f"{result}: its maps are known by the mask that they had: {error}") from error
+
+
+def _is_copy(frame: Frame, row: Row, options: FrameOptions) -> bool:
+    """Tell whether a map gives the angle of a row."""
+    from rollcli.estimator.estimate import estimate_roll
+    from rollcli.run.read import read_source
+
+    try:
+        source = read_source(frame, options)
+        found = estimate_roll(source.disparity, options.method.request(), mask=source.allowed)
+    except (OSError, RollcliError):
+        return False
+    # of a pair the row is of the road matched along its plane, the map of all that was matched; with a
+    # calibration the row is of the lane below the principal point
+    other = row.right_file or row.pitch_deg is not None
+    most = max(_SAME_DEG, row.roll_ci95_deg or 0.0) if other else _SAME_DEG
+    return abs(math.degrees(found.theta) - (row.map_roll_deg or 0.0)) < most
+
+
+def _tell_suspects(rows: Sequence[Row], options: ConvertOptions) -> None:
+    suspects, skips = sum(row.status == "suspect" for row in rows), options.skip_suspect
+    if skips and suspects == len(rows):
+        raise UsageError(f"{options.result}: every angle is suspect: --skip-suspect leaves out all maps")
+    if not suspects or options.running.quiet:
+        return
+    done = "; such maps are left out" if skips else " and used; --skip-suspect leaves such maps out"
+    say(
+        f"{options.result}: {suspects} of {len(rows)} angles {'is' if suspects == 1 else 'are'} suspect{done}"
+    )

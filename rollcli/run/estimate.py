@@ -7,9 +7,8 @@ from itertools import chain, islice
 
 from rollcli.errors import ExitStatus, OutputError, WorkerError
 from rollcli.files.stores.locations import is_url
-from rollcli.run.batch import BatchOptions, Step, join_results
+from rollcli.run.batch import BatchOptions, Step, join_results, work_on, workers_for
 from rollcli.run.find import calibration_files, calibration_notes
-from rollcli.run.frame_work import work_on, workers_for
 from rollcli.run.options import EstimateOptions
 from rollcli.run.outputs import every_path, list_files
 from rollcli.run.plan import Plan, make_plan

@@ -2,11 +2,14 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rollcli.files.atomic import is_there
 from rollcli.files.containers import file_of, is_video
 from rollcli.files.results import Row
 from rollcli.files.storage import Note
+from rollcli.files.stores.locations import is_remote, is_url
 from rollcli.messages import one_line, without_secrets
 from rollcli.rig.calibration import Calibration
 
@@ -63,6 +66,21 @@ class Frame:
     def __reduce__(self) -> tuple[type["Frame"], tuple[object, ...]]:
         """Pickle the values alone: what a dataclass with slots does takes five times as long."""
         return Frame, tuple(getattr(self, name) for name in self.__slots__)
+
+
+def frame_of_row(row: Row, result: str) -> Frame:
+    """Return the frame of a row; names are of where `estimate` ran: of this folder, or of the result's."""
+    path, right = (located_beside(name, result) for name in (row.file, row.right_file))
+    return Frame(row.file, row.right_file, path, right, relative=row.file, mask=None)
+
+
+def located_beside(name: str, result: str) -> str:
+    """Locate a file that a result names: as it is named, or else from the folder of the result."""
+    if not name or is_remote(name):  # even a look at a share of Windows is a request
+        return name
+    folder = Path() if is_url(result) else Path(result).parent  # names in a bucket are whole URLs
+    beside = str(folder / name)
+    return beside if not is_there(file_of(name)) and is_there(file_of(beside)) else name
 
 
 class Decoded(NamedTuple):

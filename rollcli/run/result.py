@@ -1,4 +1,10 @@
-"""Where the rows of a run go: to a stream, or to a file with the record of the run beside it."""
+"""Where the rows of a run go: to a stream, to a file with the record of the run beside it, or into parts.
+
+A folder of immutable parts is for Parquet, and for object stores, which cannot append. A part holds a fixed
+number of rows, and only the last part holds fewer: neither the workers nor their speed change a byte. It is
+written whole, by the worker that has all of its rows, and these count as done when it exists. Parts of CSV
+and JSON Lines, put together in their order, are the very file that a run on a local disk writes.
+"""
 
 import contextlib
 import io
@@ -9,15 +15,16 @@ from itertools import chain, islice
 from pathlib import Path
 
 from rollcli.errors import InputError, UsageError
-from rollcli.files.atomic import is_there, remove_leftovers, sync_files
-from rollcli.files.locking import exists_already, not_resumable
-from rollcli.files.results import format_header, parse_rows, run_path
-from rollcli.files.storage import is_stream, open_stream
-from rollcli.files.stores.locations import base_name
-from rollcli.run.batch import Batch
+from rollcli.extras import require_extra
+from rollcli.files import results
+from rollcli.files.atomic import is_folder, is_there, remove_leftovers, sync_files
+from rollcli.files.locking import exists_already, locked_folder, not_resumable
+from rollcli.files.storage import is_stream, list_names, open_stream, read_bytes, remove, write_bytes
+from rollcli.files.stores.locations import base_name, is_url, located, public_name
+from rollcli.run.batch import Batch, Parts, Step, part_paths
 from rollcli.run.frame import Frame
-from rollcli.run.parts import kept_in_parts, open_parts
 from rollcli.run.plan import Plan
+from rollcli.run.progress import RunSummary
 from rollcli.run.result_file import (
     Inputs,
     ResultFile,
@@ -25,9 +32,11 @@ from rollcli.run.result_file import (
     has_rows,
     inputs_path,
     is_inputs,
+    is_part_inputs,
     kept_rows,
     open_result,
     row_lines,
+    split_lines,
 )
 from rollcli.run.resume import (
     KeptRows,
@@ -46,7 +55,7 @@ class StreamOutput(Output):
     def __init__(self, write: Callable[[bytes], None], plan: Plan) -> None:
         super().__init__(RunRecord(plan), KeptRows(plan))
         self._write = write
-        self._write(format_header(plan.format, plan.further))
+        self._write(results.format_header(plan.format, plan.further))
 
     def append(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
         """Write the rows; they have left this process when this returns."""
@@ -54,8 +63,7 @@ class StreamOutput(Output):
 
 
 _MOST_IMAGES = 512
-_LONGEST_S = 1.0  # a row waits no longer for the others of its group
-_SHARE = 100  # a group lasts so many times as long as the last one took to sync: 1 % of the time at most
+_LONGEST_S = 1.0  # a row waits no longer for the others of its group, which are forced to the disk at once
 
 
 class FileOutput(Output):
@@ -70,7 +78,7 @@ class FileOutput(Output):
         self._file, self._inputs, self._written = file, inputs, 0
         self._rows: list[bytes] = []  # which wait for their images
         self._folders: set[Path] = set()  # whose names are on the disk
-        self._last, self._wait_s = time.monotonic(), 0.0
+        self._last = time.monotonic()
 
     def append(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
         """Add the rows, which may wait for others."""
@@ -84,12 +92,11 @@ class FileOutput(Output):
         self._rows += rows
         if not self._images:
             self._write()
-        if time.monotonic() - self._last >= self._wait_s or len(self._images) >= _MOST_IMAGES:
+        if time.monotonic() - self._last >= _LONGEST_S or len(self._images) >= _MOST_IMAGES:
             self._sync()
 
     def _sync(self) -> None:
         """Force the images to the disk, then write the rows and force them too."""
-        start = time.monotonic()
         if self._images:
             sync_files(self._images, self._folders)
             self._images.clear()
@@ -97,7 +104,6 @@ class FileOutput(Output):
         self._inputs.sync()
         self._file.sync()
         self._last = time.monotonic()
-        self._wait_s = min(_SHARE * (self._last - start), _LONGEST_S)
 
     def _write(self) -> None:
         rows, self._rows = self._rows, []  # first: what follows an interrupt must not write one again
@@ -125,6 +131,93 @@ class FileOutput(Output):
         return f"; {rows} rows are kept, continue with --resume" if rows and self._file.is_there() else ""
 
 
+_CHECK_S = 10.0  # a request of 50 ms now and then
+
+
+class PartsOutput(Output):
+    """Rows to a folder of parts, FILE.inputs and FILE.run.json beside it.
+
+    Workers write the parts of which they have all rows. This process writes the others.
+    """
+
+    def __init__(self, record: RunRecord, kept: KeptRows) -> None:
+        super().__init__(record, kept)
+        self._part_rows = record.plan.options.result.part_rows
+        output = located(record.plan.options.running.root, record.plan.output)
+        of_rows = {key: value for key, value in record.fixed.items() if key != "inputs"}
+        self._parts = Parts(
+            output, self._plan.format, self._plan.further, self._part_rows, (), 0, record.run, of_rows
+        )
+        self._waiting: list[tuple[int, bytes, bytes]] = []  # positions, rows, and the lines of their inputs
+        self._checked = time.monotonic()
+        self._written = kept.count - len(kept.holes)
+
+    def parts_of(self, step: Step) -> Parts | None:
+        """Say which parts the workers write of which they have all rows."""
+        if step.retries or not step.positions:
+            return None
+        numbers = tuple(position // self._part_rows for position in step.positions[:: self._part_rows])
+        return self._parts._replace(numbers=numbers, frames=len(step.positions))
+
+    def append(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
+        """Take the rows; every full part is written."""
+        if time.monotonic() - self._checked > _CHECK_S:
+            self.record.check_owned()
+            self._checked = time.monotonic()
+        done = batch.in_parts
+        self._written += done
+        self._waiting += zip(positions[done:], batch.lines, batch.notes, strict=True)
+        self._take_images(frames[done:], batch.figures.status[done:])
+        while len(self._waiting) >= self._part_rows:
+            self._write()
+
+    def finish(self, summary: RunSummary) -> None:
+        """Write the last part, and the summary into the record."""
+        if self._waiting:
+            self._write()
+        super().finish(summary)
+        _remove_leftovers(self._plan)  # of workers that have died
+
+    def commit(self) -> None:
+        """Write those parts anew of which rows are replaced; a part that is new waits until it is full."""
+        self._sync_images()
+        for number in dict.fromkeys(position // self._part_rows for position in self._new_rows):
+            self._write_anew(number)
+        self._end_replacing()
+
+    def _write_anew(self, number: int) -> None:
+        plan, first = self._plan, number * self._part_rows
+        location, path = part_paths(plan.output, plan.format, number)
+        header = results.format_header(plan.format, plan.further) if number else b""  # the first part has it
+        ((name, data),) = results.read_parts(plan.output, [base_name(location)], header)
+        old = [results.format_row(row, plan.format, plan.further) for row in results.parse_rows(data, name)]
+        inputs = read_bytes(path)
+        lines = [self._new_rows.get(*each) for each in enumerate(old, first)]
+        notes = b"".join(self._new_notes.get(*each) for each in enumerate(split_lines(inputs), first))
+        if notes != inputs:
+            self.record.check_owned()
+            # in this order: of a run that is killed in between, the rows still are errors, and are done again
+            write_bytes(path, notes, durable=True)
+        if lines != old:
+            self.record.check_owned()
+            write_bytes(location, self._parts.encoded(number, lines), durable=True)
+
+    def hint(self) -> str:
+        """Say that --resume continues after the last part."""
+        return f"; {self._written} rows are kept, continue with --resume" if self._written else ""
+
+    def _sync_images(self) -> None:
+        sync_files(self._images)
+        self._images.clear()
+
+    def _write(self) -> None:
+        self._sync_images()
+        positions, lines, notes = zip(*self._waiting[: self._part_rows], strict=True)
+        self._parts.write(positions[0] // self._part_rows, lines, notes)
+        self._written += len(lines)
+        self._waiting = self._waiting[self._part_rows :]
+
+
 @contextlib.contextmanager
 def open_output(plan: Plan) -> Iterator[Output]:
     """Begin a result, or continue that of an interrupted run.
@@ -138,14 +231,16 @@ def open_output(plan: Plan) -> Iterator[Output]:
         It cannot be written.
     """
     if plan.in_parts:
-        with open_parts(plan) as parts:
-            yield parts
-        return
-    _check_permitted(plan)
-    if is_stream(plan.output):
+        if plan.format == "parquet":
+            require_extra("parquet", "Parquet")  # before any work
+        _check_parts(plan)
+        with contextlib.nullcontext() if is_url(plan.output) else locked_folder(plan.output):
+            yield _begin_parts(plan)
+    elif is_stream(plan.output):
         with open_stream(plan.output) as write:
             yield StreamOutput(write, plan)
     else:
+        _check_permitted(plan)
         with open_result(plan.output) as file:
             _check_permitted(plan)  # again, now that no other run can write it
             with open_result(inputs_path(plan.output)) as inputs:
@@ -160,11 +255,14 @@ def kept_of(plan: Plan) -> KeptRows:
     UsageError
         As `open_output`.
     """
+    parts = list[str]()
     if plan.in_parts:
-        return kept_in_parts(plan)
-    _check_permitted(plan)
-    kept, *_ = _parsed(data_of(plan.output) if plan.options.result.resume else b"", plan)
-    checked_record(plan, kept)
+        parts = _check_parts(plan)
+        kept, _ = _kept_parts(plan, parts)
+    else:
+        _check_permitted(plan)
+        kept, *_ = _parsed(data_of(plan.output) if plan.options.result.resume else b"", plan)
+    checked_record(plan, kept, parts)
     return kept
 
 
@@ -184,7 +282,7 @@ def _parsed(data: bytes, plan: Plan) -> tuple[KeptRows, bytes, bytes]:
     inputs = Inputs(data_of(inputs_path(plan.output)), updates=update)
     if update:
         data, kept.gone = arranged(data, plan)
-    kept.take(parse_rows(data, plan.output), inputs)
+    kept.take(results.parse_rows(data, plan.output), inputs)
     lines = row_lines(io.BytesIO(data), plan.format)
     rows = b"".join(islice(lines, kept.count + (plan.format == "csv"))) if kept.count else b""
     return kept, rows, bytes(inputs.lines)
@@ -203,7 +301,7 @@ def _begin(file: ResultFile, inputs: ResultFile, plan: Plan) -> FileOutput:
     inputs.keep(lines)
     record.write()
     if not kept.count:
-        file.append(format_header(plan.format, plan.further))
+        file.append(results.format_header(plan.format, plan.further))
     return FileOutput(file, inputs, record, kept)
 
 
@@ -218,9 +316,98 @@ def _check_permitted(plan: Plan) -> None:
         if not is_there(inputs_path(name)):
             raise not_resumable(name, f"there is no {base_name(inputs_path(name))}")
         return
-    for path, is_ours in ((inputs_path(name), is_inputs), (run_path(name), is_replaceable_record)):
+    for path, is_ours in ((inputs_path(name), is_inputs), (results.run_path(name), is_replaceable_record)):
         if not is_ours(path):
             raise UsageError(
                 f"{path}: exists already and is not of a run; give another --output, or --overwrite to "
                 "replace it"
             )
+
+
+def _begin_parts(plan: Plan) -> PartsOutput:
+    # again, now that no other run can write it
+    parts = _check_parts(plan)
+    kept, renewed = _kept_parts(plan, parts)
+    record = new_record(plan, kept, parts)
+    _remove_leftovers(plan, parts)
+    rows = plan.options.result.part_rows
+    whole = set(range(_whole_parts(kept.count, rows))).difference(at // rows for at in kept.holes)
+    stay = {path for number in whole for path in part_paths(plan.output, plan.format, number)}
+    inputs = [f"{inputs_path(plan.output)}/{name}" for name in list_names(inputs_path(plan.output))]
+    # in this order, no part is ever without its inputs
+    for path in (*(f"{plan.output}/{name}" for name in parts), *filter(is_part_inputs, inputs)):
+        if path not in stay:
+            remove(path)
+    record.write()
+    record.check_owned()  # another run may have begun in this very second
+    for path, lines in renewed.items():
+        write_bytes(path, lines, durable=True)
+    return PartsOutput(record, kept)
+
+
+def _remove_leftovers(plan: Plan, parts: Sequence[str] = ()) -> None:
+    """Remove what killed processes left beside the parts of this run, and these of an earlier one."""
+    if not is_url(plan.output):
+        every = range(_whole_parts(len(plan.frames), plan.options.result.part_rows))
+        to_write = [path for number in every for path in part_paths(plan.output, plan.format, number)]
+        remove_leftovers(
+            [results.run_path(plan.output), *to_write, *(f"{plan.output}/{name}" for name in parts)]
+        )
+
+
+def _check_parts(plan: Plan) -> list[str]:
+    """Return the names of the parts that exist, in order; refuse to touch them unless told how.
+
+    Raises
+    ------
+    UsageError
+        Parts exist and neither --resume nor --overwrite is given; or a file is in the folder's place.
+    """
+    for path in () if is_url(plan.output) else (plan.output, inputs_path(plan.output)):
+        if is_there(path) and not is_folder(path):
+            raise UsageError(f"{path}: is a file; a result of parts is a folder, give another --output")
+    resume, overwrite = plan.options.result.resume, plan.options.running.overwrite
+    parts = results.part_names(list_names(plan.output))
+    if parts and not (resume or overwrite):
+        raise exists_already(plan.output)
+    endings = {name.rpartition(".")[2] for name in parts}
+    if resume and parts and endings != {plan.format}:
+        raise not_resumable(plan.output, f"its parts are {', '.join(sorted(endings))}, not {plan.format}")
+    return parts
+
+
+def _kept_parts(plan: Plan, parts: list[str]) -> tuple[KeptRows, dict[str, bytes]]:
+    """Take in the rows of the parts that are not short, wherever others are missing.
+
+    A part is short that was the last one of fewer frames. Files of inputs come back with their lines where
+    states differ and contents do not.
+    """
+    kept, renewed = KeptRows(plan), dict[str, bytes]()
+    if not plan.options.result.resume:
+        return kept, renewed
+    rows, numbered = plan.options.result.part_rows, dict[str, int]()
+    for name in parts:
+        number = int(name.removeprefix("part-").partition(".")[0])
+        if name == results.part_name(number, plan.format):  # no run names a part otherwise
+            numbered[name] = number
+    header = b"" if 0 in numbered.values() else results.format_header(plan.format, plan.further)
+    try:
+        for name, data in results.read_parts(plan.output, numbered, header):
+            found, first = tuple(results.parse_rows(data, name)), rows * numbered[base_name(name)]
+            if len(found) < rows and first + len(found) != len(plan.frames):
+                continue
+            kept.skip_to(first)
+            _, path = part_paths(plan.output, plan.format, numbered[base_name(name)])
+            inputs = read_bytes(path)
+            lines = Inputs(inputs)
+            if not kept.take(found, lines):
+                raise InputError(f"{public_name(path)}: is damaged: it does not say what a row was made from")
+            if lines.lines != inputs:
+                renewed[path] = bytes(lines.lines)
+    except InputError as error:
+        raise not_resumable(plan.output, str(error)) from error
+    return kept, renewed
+
+
+def _whole_parts(rows: int, part_rows: int) -> int:
+    return -(-rows // part_rows)

@@ -20,17 +20,15 @@ from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.quantities import ALIGNMENT, COLUMNS, QUANTITIES, ROLL
 from rollcli.rig.words import findings
 from rollcli.run.find import calibration_finder
-from rollcli.run.frame import Frame
-from rollcli.run.options import FrameOptions, RigOptions
+from rollcli.run.frame import Frame, frame_of_row
+from rollcli.run.options import FrameOptions, RegionOptions, RigOptions
 from rollcli.run.outputs import check_named_once, listed_only
-from rollcli.run.read import FRAME_ERRORS, read_views, road_finder
-from rollcli.run.result_rows import frame_of_row
+from rollcli.run.read import FRAME_ERRORS, read_source
 from rollcli.run.resume import recorded_options
 from rollcli.run.rig_gates import check_options, health_of, run_checks, status_of
 from rollcli.run.rig_text import FORMATS, NO_COLUMNS, Findings, correction_text, moves
 from rollcli.stereo.alignment import Measured
 from rollcli.stereo.correction import DriveRows
-from rollcli.stereo.match import match_pair
 from rollcli.stereo.row_fit import ColumnEvidence, column_support
 
 
@@ -243,7 +241,8 @@ def run_rig(options: RigOptions) -> int:
         missing, notes = missing or later, [*notes, *more]
         changes = {each.name: difference(rig.now(each), after.now(each), each) for each in QUANTITIES}
     calibration = calibration_finder(options.calibration)(rig.frames.files[-1])
-    health = health_of(rig, calibration, 1.0 if calibration is None else _downscale(options.results[-1]))
+    downscale = 1.0 if calibration is None else _recorded(options.results[-1]).stereo.downscale
+    health = health_of(rig, calibration, downscale)
     if calibration is not None and (health is None or calibration.baseline is None):
         lacks = "no pair was measured" if health is None else "it has no baseline"
         notes.append(f"the calibration tells what misaligned views do to depth; no effect here: {lacks}")
@@ -267,8 +266,8 @@ def run_rig(options: RigOptions) -> int:
     return status_of(checks)
 
 
-def _downscale(result: str) -> float:
-    return recorded_options(read_run(result), run_path(result)).stereo.downscale
+def _recorded(result: str) -> FrameOptions:
+    return recorded_options(read_run(result), run_path(result))
 
 
 _PAIRS = 24  # matched again, a few seconds: 8 of rendered roads tell a scale to 0.02 %, one to 0.1
@@ -289,13 +288,11 @@ def rows_of_drive(rig: RigAssessment, results: Sequence[str]) -> DriveRows | Non
     found: list[Measured] = []
     for frame, options in _pairs(rig, results):
         try:
-            left, right = read_views(frame, options)
-            find_road = road_finder(None, options.method.request())
-            measured = match_pair(left, right, options.stereo, find_road).measured
+            match = read_source(frame, options).match
         except FRAME_ERRORS:  # the pairs that are left may be enough
             continue
-        if measured is not None:
-            found.append(measured)
+        if match is not None and match.measured is not None:
+            found.append(match.measured)
     sizes = [(each.rows.shape, each.rows.factor) for each in found]
     same = [each for each, size in zip(found, sizes, strict=True) if size == sizes[-1]]
     if len(same) < _FEWEST:
@@ -323,8 +320,9 @@ def _pairs(rig: RigAssessment, results: Sequence[str]) -> Iterator[tuple[Frame, 
     origins = rig.frames.origins or [""] * rig.count
     names = {(origins[place], rig.frames.files[place]) for place in chosen}
     for result, run in zip(results, runs, strict=True):
-        options = recorded_options(read_run(result), run_path(result))
-        options = options._replace(stereo=replace(options.stereo, align="auto", vertical_offset=None))
+        options = _recorded(result)
+        stereo = replace(options.stereo, align="auto", vertical_offset=None)
+        options = options._replace(stereo=stereo, region=RegionOptions())
         for name, data in pieces_of(result):
             for row in parse_rows(data, name):
                 if (run, row.file) in names and row.right_file and not is_remote(row.file):

@@ -32,10 +32,7 @@ def rig_values(found: "Findings") -> dict[str, Any]:
     rig, latest = found.rig, found.rig.latest()
     values: dict[str, Any] = {
         "frames": rig.count,
-        "used": rig.used,
-        "suspect": rig.suspect,
-        "failed": rig.failed,
-        "outliers": rig.outliers,
+        **{name: getattr(rig, name) for name in ("used", "suspect", "failed", "outliers")},
     }
     for quantity in QUANTITIES:
         values |= named(quantity.name, rig.now(quantity), quantity.suffix)
@@ -78,14 +75,13 @@ def _jumps(rig: RigAssessment, quantity: Quantity) -> list[dict[str, Any]]:
     return found
 
 
-_OF_JSON = (
-    *("drive", "first", "last", "frames", "used", "suspect", "roll_deg", "roll_ci95_deg", "pitch_deg"),
-    *("pitch_ci95_deg", "height_m", "height_ci95_m"),
-)
 _OF_CSV = (
-    *(*_OF_JSON, "first_file", "last_file", "between_frames_sd_deg", "drift_deg", "drift_ci95_deg"),
-    *("drift_deg_per_hour", "drift_ci95_deg_per_hour", "change_deg", "change_ci95_deg", "status"),
+    *("drive", "first", "last", "frames", "used", "suspect", "roll_deg", "roll_ci95_deg", "pitch_deg"),
+    *("pitch_ci95_deg", "height_m", "height_ci95_m", "first_file", "last_file", "between_frames_sd_deg"),
+    *("drift_deg", "drift_ci95_deg", "drift_deg_per_hour", "drift_ci95_deg_per_hour"),
+    *("change_deg", "change_ci95_deg", "status"),
 )
+_OF_JSON = _OF_CSV[: _OF_CSV.index("first_file")]
 
 
 def segment_rows(rig: RigAssessment) -> Iterator[dict[str, Any]]:

@@ -31,7 +31,7 @@ sys.path.insert(0, str(ROOT))
 import rollcli
 from rollcli.files.atomic import write_atomic
 from rollcli.pictures.heights import steadied
-from rollcli.run.images import encode_heights
+from rollcli.run.frame_task import encode_heights
 from rollcli.run.workers.pool import prepare_worker
 
 SIZE, FOCAL, BASELINE, NOISE_PX = "1242x375", 721, 0.54, 0.06

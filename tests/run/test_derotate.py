@@ -10,7 +10,7 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.request import Request
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import encode_stored, read_stored
-from rollcli.run import frame_work
+from rollcli.run import batch
 from tests.run_cli import contents, interrupt_in, road_map, rollcli, rows_of, write_kitti
 
 FRAMES = 4
@@ -91,7 +91,7 @@ def test_the_matrix_says_where_each_pixel_has_gone(tmp_path, more):
 
 def test_an_interrupted_run_says_that_what_is_written_is_whole(maps, monkeypatch):
     assert rollcli("derotate", "maps", "--roll", "2", "-o", "whole", cwd=maps).status == 0
-    interrupt_in(monkeypatch, frame_work, "do_frame")
+    interrupt_in(monkeypatch, batch, "do_frame")
     done = rollcli("derotate", "maps", "--roll", "2", "-o", "out", cwd=maps)
     assert done.status == 130
     assert "interrupted; what is written is whole, and --overwrite starts anew" in done.err

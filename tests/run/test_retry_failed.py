@@ -10,7 +10,8 @@ import pytest
 from rollcli.errors import OutputError, UsageError
 from rollcli.files.results import format_header, read_result
 from rollcli.files.storage import read_bytes, remove, write_bytes
-from rollcli.run import frame_work, parts, result_file
+from rollcli.run import batch, result_file
+from rollcli.run import result as places
 from rollcli.run.result_file import open_result
 from tests.object_store import objects_below
 from tests.run_cli import (
@@ -93,7 +94,7 @@ def test_a_retry_that_is_interrupted_keeps_what_it_has_done_and_is_taken_up_agai
     assert rollcli(*line, cwd=folder).status == 3
     mend(folder, maps, *BROKEN)
     with monkeypatch.context() as patch:
-        interrupt_in(patch, frame_work, "do_frame")
+        interrupt_in(patch, batch, "do_frame")
         done = rollcli(*line, *RETRY, cwd=folder)
     assert done.status == 130
     assert "interrupted; continue with: rollcli estimate maps" in done.err
@@ -135,7 +136,7 @@ def test_a_run_that_ends_between_rows_and_what_says_of_their_files_is_taken_up_a
     line = ("estimate", "maps", "-o", result, "--derotated", "up")
     assert rollcli(*line, cwd=folder).status == 3
     mend(folder, maps, *BROKEN)
-    for module, name in ((result_file.ResultFile, "replace"), (parts, "write_bytes")):
+    for module, name in ((result_file.ResultFile, "replace"), (places, "write_bytes")):
         done, really = [], getattr(module, name)
 
         def once(*arguments, done=done, really=really, **words):
@@ -178,7 +179,7 @@ def stopped(request, folder, maps, monkeypatch):
     full = Mock(side_effect=OutputError("the disk is full"))
     with monkeypatch.context() as patch:
         patch.setattr("rollcli.run.result_file.ResultFile.replace", full)
-        patch.setattr("rollcli.run.parts.write_bytes", full)
+        patch.setattr("rollcli.run.result.write_bytes", full)
         done = rollcli(*line, *RETRY, cwd=folder)
     assert (done.status, "the disk is full" in done.err) == (1, True)
     return folder, place or f"{folder}/", line

@@ -54,7 +54,7 @@ def test_of_two_runs_in_a_bucket_the_last_to_begin_goes_on_and_the_other_ends(bu
 
 
 def test_a_run_whose_rows_come_slowly_looks_now_and_then(plan, monkeypatch):
-    monkeypatch.setattr("rollcli.run.parts._CHECK_S", 0.0)
+    monkeypatch.setattr("rollcli.run.result._CHECK_S", 0.0)
     with open_output(plan) as first:
         append(first, plan.frames[:1])
         with open_output(plan), pytest.raises(UsageError, match=ANOTHER):
