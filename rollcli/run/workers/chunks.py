@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from rollcli.errors import RollcliError, raised_at
 from rollcli.files.stores.locations import computing
@@ -35,34 +35,25 @@ _LEAST_S = 0.05  # unless that is less than this, or than half of what _CHUNKS_A
 _DOUBT_S = 0.02  # added to what the first tasks took: one that fails at once says nothing of the others
 
 
-class Span(Sequence[Task]):
+class Span(list[Task]):
     """Consecutive tasks that a worker gets at once.
 
     Parameters
     ----------
-    tasks : sequence
+    tasks : iterable
     first : int
         The position of the first one among all tasks, from 0.
     told : object
         What `Work.tell` said when they were taken.
     """
 
-    __slots__ = ("first", "tasks", "told")
+    def __init__(self, tasks: Iterable[Task], first: int = 0, told: Any = None) -> None:
+        super().__init__(tasks)
+        self.first, self.told = first, told
 
-    def __init__(self, tasks: Sequence[Task], first: int = 0, told: Any = None) -> None:
-        self.tasks, self.first, self.told = tasks, first, told
-
-    def __len__(self) -> int:
-        return len(self.tasks)
-
-    @overload
-    def __getitem__(self, at: int) -> Task: ...
-    @overload
-    def __getitem__(self, at: slice) -> "Span[Task]": ...
-    def __getitem__(self, at: int | slice) -> "Task | Span[Task]":
-        if isinstance(at, int):
-            return self.tasks[at]
-        return Span(self.tasks[at], self.first + at.indices(len(self))[0], self.told)
+    def part(self, start: int, end: int | None = None) -> "Span[Task]":
+        """Return some of the tasks as a span of their own."""
+        return Span(self[start:end], self.first + start, self.told)
 
 
 def _as_they_are(chunk: Sequence[Task], results: list[Result]) -> Sequence[Result]:
@@ -151,7 +142,7 @@ class Chunks(Generic[Task]):
     def take(self, workers: int, told: Any = None) -> Span[Task]:
         """Take the next chunk, for one of so many workers; empty when there are no more tasks."""
         size = self._size(self._taken, self._count - self._taken, workers)
-        chunk = Span(list(itertools.islice(self._tasks, size)), self._taken, told)
+        chunk = Span(itertools.islice(self._tasks, size), self._taken, told)
         self._taken += len(chunk)
         return chunk
 
@@ -160,8 +151,8 @@ class Chunks(Generic[Task]):
         least = -(-len(rest) // (_SHARES * workers))
         while rest:
             size = max(self._size(rest.first, len(rest), workers), least)
-            yield rest[:size]
-            rest = rest[size:]
+            yield rest.part(0, size)
+            rest = rest.part(size)
 
     def _size(self, first: int, left: int, workers: int) -> int:
         """Choose the size of a chunk from the position of its first task and the number of tasks to come."""

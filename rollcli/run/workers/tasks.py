@@ -73,7 +73,8 @@ def in_order(
             if stop.asked:
                 return  # whoever asked has ended the workers too
             if len(chunk) > 1:
-                submit_first(chunk[: len(chunk) // 2], chunk[len(chunk) // 2 :])
+                half = len(chunk) // 2
+                submit_first(chunk.part(0, half), chunk.part(half))
                 continue
             try:
                 done = executor.retry(chunk)
@@ -84,7 +85,7 @@ def in_order(
             yield done.results
         if done.error is not None:
             raise done.error
-        if rest := chunk[len(done.results) :]:
+        if rest := chunk.part(len(done.results)):
             if stop.asked:
                 return
             submit_first(*chunks.cut(rest, executor.workers))
