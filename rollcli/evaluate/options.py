@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from rollcli.run.options import FramesOptions, RegionOptions, RunningOptions, Written
+from rollcli.run.options import FramesOptions, RegionOptions, RunningOptions
 
 
 @dataclass(frozen=True)
@@ -69,11 +69,6 @@ class PaperOptions(FramesOptions):
     """Everything that `rollcli evaluate paper` was asked."""
 
     experiments: ExperimentOptions
-
-    @property
-    def writes(self) -> tuple[Written, ...]:
-        """No file of each map."""
-        return ()
 
     @property
     def folders(self) -> list[str]:

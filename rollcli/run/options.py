@@ -5,7 +5,6 @@ What a docstring says of a field is the help of the field's option, and names va
 
 import math
 import posixpath
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -415,7 +414,7 @@ class ResultOptions(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FramesOptions(ABC):
+class FramesOptions:
     """What every command is told that goes through frames."""
 
     inputs: InputOptions
@@ -433,9 +432,9 @@ class FramesOptions(ABC):
         return any((*self.pairs[:2], self.pairs.side_by_side, *self.topics[:2]))
 
     @property
-    @abstractmethod
     def writes(self) -> tuple[Written, ...]:
         """The files that may be written for a frame."""
+        return ()
 
     @property
     def folders(self) -> list[str]:

@@ -55,9 +55,8 @@ def every_path(frame: Frame, writes: Iterable[Written], root: str = "") -> list[
 
 def files_of(frames: Iterable[Frame], writes: Sequence[Written], root: str = "") -> Iterator[str]:
     """Yield every file that may be written for frames; a list of them would take most of our memory."""
-    if not writes:
-        return iter(())
-    return (path for frame in frames for path in every_path(frame, writes, root))
+    for frame in frames if writes else ():
+        yield from every_path(frame, writes, root)
 
 
 def write_outputs(

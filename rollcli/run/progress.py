@@ -72,9 +72,7 @@ class RunSummary:
 
     def add(self, files: Sequence[str], figures: Figures, places: Sequence[int]) -> None:
         """Take rows, which stand at these places of the result, from 0."""
-        for place, status in enumerate(STATUSES):
-            if found := figures.status.count(place):
-                self.counts[status] += found
+        self.counts.update(STATUSES[place] for place in figures.status)
         if self._too_many:
             return
         self._files.extend(files)
