@@ -89,7 +89,7 @@ class ClusterExecutor(Generic[Task, Result]):
     def __init__(self, given: str, work: Work[Task, Result], asked: Workers) -> None:
         self.threads, self.address = asked.threads, scheduler_address(given)
         self._work, self._asked, self._stopped = work, asked, False
-        self._run = uuid.uuid4().hex
+        self._run, self._looked = uuid.uuid4().hex, time.monotonic()
         self._threads_of: dict[str, int] = {}  # by the addresses of the workers that take part
         self._refused: set[str] = set()
         self._in_flight: weakref.WeakSet[ClusterFuture[Task, Result]] = weakref.WeakSet()
@@ -109,17 +109,14 @@ class ClusterExecutor(Generic[Task, Result]):
         """The number of threads of the workers that take part; it is asked for once a second."""
         if time.monotonic() - self._looked > _LOOK_S:
             self.take_in_workers()
+            self._looked = time.monotonic()
         return max(sum(self._threads_of.values()), 1)
 
     def take_in_workers(self) -> None:
         """Take in workers that have joined, and say which of them cannot take part."""
-        try:
-            problems = self._look_for_workers()
-        except OSError:  # the scheduler is lost, which is said once Dask gives it up
-            self._looked = time.monotonic()
-            return
-        for worker, problem in problems.items():
-            say(f"worker {worker}: {problem}; it gets no work")
+        with contextlib.suppress(OSError):  # the scheduler is lost, which is said once Dask gives it up
+            for worker, problem in self._look_for_workers().items():
+                say(f"worker {worker}: {problem}; it gets no work")
 
     def submit(self, chunk: Sequence[Task], *, first: bool = False) -> "ClusterFuture[Task, Result]":
         """Queue a chunk for whichever worker is free."""
@@ -184,7 +181,6 @@ class ClusterExecutor(Generic[Task, Result]):
         for future in self._in_flight if self._threads_of else ():
             if future.chosen and future.chosen.isdisjoint(self._threads_of):
                 future.send_again()  # all who might do it have gone
-        self._looked = time.monotonic()
         return problems
 
 
@@ -349,18 +345,15 @@ def _problems(client: Any, asked: Workers, workers: Collection[str]) -> tuple[di
     files = {path.absolute() for path in map(Path, asked.files) if is_file(path)}
     sizes = {str(path): path.stat().st_size for path in files}
     name = f".rollcli-check-{uuid.uuid4().hex}"  # of this run's own: another one may be asking now
-    marks = [Path(folder).absolute() / name for folder in asked.folders if not is_url(folder)]
-    made: list[Path] = []
+    marks = [str(Path(folder).absolute() / name) for folder in asked.folders if not is_url(folder)]
     try:
         for mark in marks:
-            made.append(mark)
             write_atomic(mark, b"")
-        names = [str(mark) for mark in marks]
-        answers = client.run(probe, __version__, sizes, names, workers=list(workers), on_error="return")
+        answers = client.run(probe, __version__, sizes, marks, workers=list(workers), on_error="return")
     finally:
-        for mark in made:
+        for mark in marks:
             with contextlib.suppress(OutputError):  # the one that could not be made
-                remove(str(mark))
+                remove(mark)
     unable = f"cannot run rollcli {__version__}: "
     silent = {worker for worker, answer in answers.items() if isinstance(answer, OSError)}
     problems = {
