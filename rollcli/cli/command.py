@@ -179,7 +179,6 @@ def record(
     make: Callable[..., Any],
     *declarations: Declaration,
     only_with: Sequence[Needs] = (),
-    fields: Any = None,
 ) -> Declaration:
     """Declare a section of options that the command receives as one record.
 
@@ -192,13 +191,11 @@ def record(
     title : str
         The heading in the help.
     make : callable
-        Makes the record of the values, which it takes by the names of the fields.
+        Makes the record of the values; its fields have defaults and help.
     *declarations
         What `option` and `click.argument` return.
     only_with : sequence of Needs
         See `Option`.
-    fields : class, optional
-        Whose fields have defaults and help; by default `make`.
     """
 
     def declare(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -209,7 +206,7 @@ def record(
         for param in params:
             if isinstance(param, Option):
                 param.section, param.only_with = title, (*only_with, *param.only_with)
-        field_of = _fill(params, fields or make)
+        field_of = _fill(params, make)
 
         @functools.wraps(function)  # its parameters, too
         def gathered(**values: Any) -> Any:
@@ -223,13 +220,14 @@ def record(
 
 # of a docstring's sections Attributes and Examples
 _FIELD = re.compile(r"^(\w+) : .+\n((?: {4}.+\n?)+)", re.MULTILINE)
+_FIELDS = {"from": "result", "sgbm_mode": "mode"}  # of options that have another name
 _EXAMPLE = re.compile(r"^(\S.*)\n((?: {4}.+\n?)+)", re.MULTILINE)
 
 
 def _fill(params: Sequence[click.Parameter], record: Any) -> dict[str, str]:
     """Give options that declare no default or no help those of their fields in a record; return the fields.
 
-    The name of a field may add the unit, `_deg`; that of --from is `result`.
+    The name of a field may add the unit, `_deg`; those of `_FIELDS` differ.
     """
     known = inspect.signature(record).parameters
     texts: dict[str, str] = {}
@@ -237,7 +235,7 @@ def _fill(params: Sequence[click.Parameter], record: Any) -> dict[str, str]:
         texts |= dict(_FIELD.findall(inspect.cleandoc(each.__doc__ or "")))
     field_of: dict[str, str] = {}
     for param in params:
-        name = "result" if param.name == "from" else str(param.name)
+        name = _FIELDS.get(str(param.name), str(param.name))
         field = field_of[str(param.name)] = f"{name}_deg" if f"{name}_deg" in known else name
         if not isinstance(param, Option):
             continue

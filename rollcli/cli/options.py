@@ -1,6 +1,6 @@
 """The options that commands share, each declared once."""
 
-from typing import Any, get_args
+from typing import get_args
 
 import click
 
@@ -41,14 +41,6 @@ _BASELINE = Needs(
     lambda ctx: ctx.command.name != "vdisparity" or ctx.params["encoding"] == "depth",
     "the horizon does not depend on it; only --encoding depth needs it",
 )
-
-
-def _stereo(
-    *, num_disparities: int | str, sgbm_mode: str, vertical_offset: float | str, **values: Any
-) -> StereoOptions:
-    searched = None if num_disparities == "auto" else int(num_disparities)
-    offset = None if vertical_offset == "auto" else float(vertical_offset)
-    return StereoOptions(num_disparities=searched, mode=sgbm_mode, vertical_offset=offset, **values)
 
 
 _folders = (
@@ -98,50 +90,25 @@ topic_options = record(
 stereo_options = record(
     "stereo",
     "Stereo matching (OpenCV SGBM)",
-    _stereo,
-    option(
-        "--num-disparities",
-        Number("PX", above=0, whole=True, auto=True),
-        text="Width of the searched range, pixels, a multiple of 16; auto: found from each pair.",
-        default="auto",
-    ),
+    StereoOptions,
+    option("--num-disparities", Number("PX", above=0, whole=True, auto=None), default="auto"),
     option("--min-disparity", Number("PX", whole=True)),
     option("--block-size", Number("PX", at_least=1, whole=True)),
-    option(
-        "--sgbm-mode",
-        Choice(*MODES),
-        text="OpenCV's variants: 3way (fast), sgbm (5 directions), hh (8: slow, much memory).",
-        default=StereoOptions.mode,
-    ),
+    option("--sgbm-mode", Choice(*MODES)),
     option("--uniqueness", Number("PERCENT", at_least=0, at_most=99, whole=True)),
     option("--speckle-size", Number("PX", at_least=0, whole=True)),
     option("--speckle-range", Number("PX", at_least=0, whole=True)),
-    option(
-        "--downscale",
-        Number("F", at_least=1),
-        text="Match at 1/F of the size; maps, regions of them and pixel columns refer to that size.",
-    ),
+    option("--downscale", Number("F", at_least=1)),
     option(
         "--align",
         FilePath("auto|off|FILE"),
         Needs(
-            lambda ctx: ctx.params["vertical_offset"] == "auto",
+            lambda ctx: ctx.params["vertical_offset"] is None,
             "--vertical-offset says how the right image lies",
         ),
-        text="auto: measure how much lower, larger and how far turned the right image is against the left, "
-        "correct that before matching, and say so in the row; off: match the images as they are; FILE: "
-        "correct all pairs as `rollcli rig --correction FILE` says, each by its own offset as far as the "
-        "drive leaves it open.",
     ),
-    option(
-        "--vertical-offset",
-        Number("PX", auto=True),
-        text="How much lower the right image lies, pixels: corrected as given, and nothing is measured; "
-        "auto: as --align says.",
-        default="auto",
-    ),
+    option("--vertical-offset", Number("PX", auto=None), default="auto"),
     only_with=[_PAIRS],
-    fields=StereoOptions,
 )
 
 encoding_options = record(
@@ -183,7 +150,7 @@ method_options = record(
     option("--road", Choice(*ROADS)),
     option(
         "--lambda0",
-        Number("FLOAT", above=0, auto=True),
+        Number("FLOAT", above=0, auto="auto"),
         Needs(lambda ctx: ctx.params["method"] == "gd", "only --method gd has a learning rate"),
     ),
     option(
@@ -213,9 +180,7 @@ heights_range_option = option(
         lambda ctx: any(ctx.params.get(each) for each in ("preview", "heights_preview")),
         "only previews of heights have colours",
     ),
-    text="Heights with the outermost colours of a preview, A:B, metres or camera heights.",
     section="Output",
-    default="{:.2f}:{:.2f}".format(*records.HEIGHTS_RANGE),
 )
 
 
@@ -230,11 +195,7 @@ save_as_option = option(
         ),
         "only --disparity, --derotated and --heights write maps",
     ),
-    text="Format of maps computed from pairs: 16-bit KITTI PNG (TIFF for a map beyond its 256 px), float32 "
-    "TIFF or float32 NPY; of heights: TIFF, or NPY. Maps as PNG and TIFF carry what levelling left "
-    "uncertain, for `estimate`; NPY cannot.",
     section="Output",
-    default="png",
 )
 
 output_folder_option = option("-o, --output", DIR, required=True, section="Output")

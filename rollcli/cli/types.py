@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable
 from functools import partial
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -88,7 +88,10 @@ def table_format(given: str | None, output: str) -> str:
 
 
 class Number(ParamType):
-    """A finite number within bounds, with its unit as the placeholder; "auto" where that is allowed."""
+    """A finite number within bounds, with its unit as the placeholder.
+
+    `auto` is what the word "auto" stands for; False: it is no value.
+    """
 
     def __init__(
         self,
@@ -97,11 +100,11 @@ class Number(ParamType):
         above: float = -math.inf,
         at_least: float = -math.inf,
         at_most: float = math.inf,
-        auto: bool = False,
+        auto: str | Literal[False] | None = False,
         whole: bool = False,
         but: float | None = None,
     ) -> None:
-        self.name, self.metavar, self.but = unit, f"{unit}|auto" if auto else unit, but
+        self.name, self.metavar, self.but = unit, unit if auto is False else f"{unit}|auto", but
         self.above, self.at_least, self.at_most = above, at_least, at_most
         self.auto, self.whole = auto, whole
         bounds = [
@@ -111,11 +114,11 @@ class Number(ParamType):
             f"of at most {at_most:g}" if at_most < math.inf else "",
         ]
         words = "a whole number" if whole else "a number", " and ".join(filter(None, bounds))
-        self.what = " ".join(filter(None, [*words, "or auto" if auto else ""]))
+        self.what = " ".join(filter(None, [*words, "" if auto is False else "or auto"]))
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | str:
-        if self.auto and value == "auto":
-            return "auto"
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if self.auto is not False and value == "auto":
+            return self.auto
         try:
             number = int(value) if self.whole and not isinstance(value, float) else float(value)
         except (TypeError, ValueError, OverflowError):
@@ -212,7 +215,8 @@ _size = _numbers("xX×", lambda width, height: 16 <= width <= 16384 and 16 <= he
 _turns = _numbers(  # at most 1000 angles
     ":", lambda low, high, step: -90 <= low <= high <= 90 and step > 0 and high - low <= 1000 * step
 )
-WIDE_SPAN = Parsed("A:B", _numbers(":", lambda low, high: low < high), "A:B with A < B, such as -0.1:0.1")
+_wide = _numbers(":", lambda low, high: low < high)
+WIDE_SPAN = Parsed("A:B", _wide, "A:B with A < B, such as -0.1:0.1", ":")
 ANY_NUMBER = Parsed("VALUE", _any_number, "a number")  # that a pixel may hold: also nan and inf
 ROI = Parsed("X0,Y0,X1,Y1", _box, "X0,Y0,X1,Y1 in whole pixels with 0 <= X0 < X1 and 0 <= Y0 < Y1")
 POINT = Parsed("CX,CY", _point, "CX,CY in pixels, such as 609.6,172.9")

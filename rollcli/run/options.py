@@ -263,7 +263,9 @@ class ImageOptions(NamedTuple):
     heights_range : tuple of float
         Heights with the outermost colours of a preview, A:B, metres or camera heights.
     save_as : {"png", "tiff", "npy"}
-        Of maps and heights.
+        Format of maps computed from pairs: 16-bit KITTI PNG (TIFF for a map beyond its 256 px), float32
+        TIFF or float32 NPY; of heights: TIFF, or NPY. Maps as PNG and TIFF carry what levelling left
+        uncertain, for `estimate`; NPY cannot.
     """
 
     derotated: str | None = None
@@ -542,6 +544,8 @@ class HeightsOptions(ConvertOptions):
         The road of each map, from what `rollcli estimate` wrote; matched by stem.
     preview : str or None
         Also write pictures of the heights, PNG, every frame in the same colours.
+    heights_range : tuple of float
+        Heights with the outermost colours of a preview, A:B, metres or camera heights.
     save_as : {"tiff", "npy"}
         float32 TIFF, whose description names the unit, or float32 NPY.
     skip_suspect : bool
@@ -600,6 +604,9 @@ class DisparityOptions(ConvertOptions):
 
     Attributes
     ----------
+    save_as : {"png", "tiff", "npy"}
+        16-bit KITTI PNG (TIFF for a map beyond its 256 px), float32 TIFF or float32 NPY. PNG and TIFF carry
+        what levelling left uncertain, for `estimate`; NPY cannot.
     preview : str or None
         Also write each map as a picture to look at, in colour with a scale in pixels, PNG.
     """

@@ -31,14 +31,15 @@ class StereoOptions:
     Attributes
     ----------
     num_disparities : int or None
-        Width of the range searched, rounded up to a multiple of 16; None: found from the pair itself.
+        Width of the searched range, pixels, rounded up to a multiple of 16; by default found from each
+        pair.
     min_disparity : int
         Smallest disparity searched, pixels.
     block_size : int
         Side of the matched block, pixels, odd.
     mode : {"3way", "sgbm", "hh"}
-        OpenCV's variants: three directions (fast, and on real roads the nearest to lidar), five, eight
-        (slow, much memory).
+        OpenCV's variants: 3way: three directions (fast, and on real roads the nearest to lidar); sgbm: five;
+        hh: eight (slow, much memory).
     uniqueness : int
         Margin by which the best match must win, percent.
     speckle_size : int
@@ -46,13 +47,15 @@ class StereoOptions:
     speckle_range : int
         Disparity step within a patch, pixels.
     downscale : float
-        Match at 1/downscale of the size.
+        Match at 1/F of the size; maps, regions of them and pixel columns refer to that size.
     align : {"auto", "off"} or path
-        Whether to measure how the right view lies against the left one, and to level it; or the file of a
-        correction for all pairs.
+        auto: measure how much lower, larger and how far turned the right image is against the left,
+        correct that before matching, and say so in the row; off: match the images as they are; FILE:
+        correct all pairs as `rollcli rig --correction FILE` says, each by its own offset as far as the
+        drive leaves it open.
     vertical_offset : float or None
         How much lower the right image lies, pixels of the size matched at: corrected as given, and
-        nothing is measured; None: as `align` says.
+        nothing is measured; by default as --align says.
     """
 
     num_disparities: int | None = None

@@ -20,7 +20,7 @@ def test_a_session_goes_as_it_is_written_down(tmp_path, heading):
 
 VALUES = Path(__file__).with_name("values.txt").read_text("utf-8").partition("\n\n")[2]
 KINDS = {
-    "ANGLE": types.Number("DEG", above=0, at_most=90, auto=True),
+    "ANGLE": types.Number("DEG", above=0, at_most=90, auto="auto"),
     "CHOICE": types.Choice("gd", "gss"),
     "COUNT": types.Number("N", whole=True, at_least=1),
     "FILE": types.FilePath(),
