@@ -3,7 +3,7 @@
 import html
 import math
 import textwrap
-from collections.abc import Iterable, Sequence, Set
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -23,6 +23,8 @@ from rollcli.stereo.misalignment import Misalignment
 Trace = dict[str, Any]
 
 _FEW = 10  # frames, each with a tick
+_BAND = {"fill": "toself", "fillcolor": "@band", "hoverinfo": "skip"}
+_TEXT = "%{text}<extra></extra>"
 _UNITS = (
     ("h", 3600.0, 2 * 3600.0),
     ("min", 60.0, 120.0),
@@ -111,11 +113,11 @@ def rig_traces(
     list of dict
         As plotly takes them; empty ones are left out.
     """
-    band, means, jumps = _trace("mounting, 95 %"), _trace("mounting"), _trace("jump")
     name = quantity.name.replace("_", " ")
-    band |= {"fill": "toself", "fillcolor": "@band", "line": {"width": 0}, "hoverinfo": "skip"}
-    means["line"] = {"color": "@c3", "width": 2}
-    jumps["line"] = {"color": "@error", "width": 1.5, "dash": "dash"}
+    band = _trace("mounting, 95 %", **_BAND, line={"width": 0})
+    means = _trace("mounting", text=[], hovertemplate=_TEXT, line={"color": "@c3", "width": 2})
+    dashes = {"color": "@error", "width": 1.5, "dash": "dash"}
+    jumps = _trace("jump", text=[], hovertemplate=_TEXT, line=dashes)
     for drive in rig.drives:
         found = drive.quantities.get(quantity.name)
         for segment in found.segments if found is not None else ():
@@ -126,9 +128,7 @@ def rig_traces(
             level = [each.value or 0.0 for each in (segment.begin, segment.end)]
             _add(means, [first, last], level, said)
             if segment.begin.ci95 is not None and segment.end.ci95 is not None:
-                halves = segment.begin.ci95, segment.end.ci95
-                low, high = ([v + side * h for v, h in zip(level, halves, strict=True)] for side in (-1, 1))
-                _add(band, [first, last, last, first], [*high, *low[::-1]], "")
+                _add_band(band, [first, last], level, [segment.begin.ci95, segment.end.ci95])
         for jump in found.jumps if found is not None else ():
             frame = int(drive.frames[jump.frame])
             said = f"jump by {answer(jump.change, quantity, change=True)} at {rig.names[frame]}"
@@ -136,15 +136,22 @@ def rig_traces(
     return [trace for trace in (band, means, jumps) if trace["x"]]
 
 
-def _trace(name: str) -> Trace:
-    return scatter(name, "lines", [], [], text=[], hovertemplate="%{text}<extra></extra>")
+def _trace(name: str, **look: Any) -> Trace:
+    return scatter(name, "lines", [], [], **look)
 
 
-def _add(trace: Trace, x: Sequence[float], y: Sequence[float], text: str) -> None:
+def _add(trace: Trace, x: Sequence[float], y: Sequence[float], text: str = "") -> None:
     """Add a stretch; None parts it from the next."""
     trace["x"] += [*x, None]
     trace["y"] += [*(round(each, 4) for each in y), None]
-    trace["text"] += [*([html.escape(text)] * len(x)), None]
+    if text:
+        trace["text"] += [*([html.escape(text)] * len(x)), None]
+
+
+def _add_band(trace: Trace, x: Sequence[float], values: Sequence[float], halves: Sequence[float]) -> None:
+    """Add a polygon."""
+    low, high = ([v + side * h for v, h in zip(values, halves, strict=True)] for side in (-1, 1))
+    _add(trace, [*x, *x[::-1]], [*high, *low[::-1]])
 
 
 _LONGEST = 44  # characters in a line, so that a label fits a narrow screen
@@ -310,11 +317,12 @@ def chart_over_frames(rows: Sequence[Row], quantity: Quantity, rig: RigAssessmen
         for status in ("ok", "suspect")
     )
     failed = [at for at, row in enumerate(rows) if row.status == "error"]
+    along = [axis.at(number) for number in range(1, len(rows) + 1)]
     many = len(rows) > _MANY
 
     def marks(name: str, places: Sequence[int | None], mode: str = "markers", **look: Any) -> Trace:
         """Return the frames at some places among the rows; None parts a line."""
-        x = [None if at is None else axis.at(at + 1) for at in places]
+        x = [None if at is None else along[at] for at in places]
         y = [None if at is None else values[at] for at in places]
         said = [
             None if at is None else label(rows[at], with_interval(values[at], halves[at], quantity))
@@ -328,12 +336,15 @@ def chart_over_frames(rows: Sequence[Row], quantity: Quantity, rig: RigAssessmen
     edge = {"y": [_FAILED_AT] * len(failed), "yaxis": "y2"}  # they have no value
     reasons = [label(rows[at], "") for at in failed]
     stretches = _stretches(sure, starts)
+    band = _trace("95 % interval", **_BAND, line={"color": "@band", "width": 1})  # a frame alone is seen too
+    for stretch in _stretches([at for at in sure if halves[at] is not None], starts):
+        _add_band(band, *([each[at] for at in stretch] for each in (along, values, halves)))
     line = {"line": {"color": "@c1", "width": 1.5}, "marker": {"color": "@c1"}}
     # a browser takes a second for 10,000 dots, which a line of so many frames would hide anyway
     alone = [stretch[0] for stretch in stretches if many and len(stretch) == 1]
     # what is sure lies on top: suspect marks of a long run would hide it; after it in the legend
     data = [
-        _band(_stretches([at for at in sure if halves[at] is not None], starts), values, halves, axis),
+        band,
         marks("suspect", suspect, legendrank=1001, marker={"color": "@suspect", "symbol": "diamond"})
         | ({} if many else {"error_y": bars}),
         marks(
@@ -367,22 +378,6 @@ def chart_over_frames(rows: Sequence[Row], quantity: Quantity, rig: RigAssessmen
         f"{len(suspect)} suspect and {len(failed)} failed are marked"
     )
     return Chart(quantity.name, what, data, layout)
-
-
-def _band(
-    stretches: Iterable[Sequence[int]], values: Sequence[float], halves: Sequence[float], axis: FrameAxis
-) -> Trace:
-    """Return one polygon for each stretch of frames that have an interval; None parts them."""
-    x: list[float | None] = []
-    y: list[float | None] = []
-    for stretch in stretches:
-        along = [axis.at(at + 1) for at in stretch]
-        upper, lower = ([round(values[at] + side * halves[at], 4) for at in stretch] for side in (1, -1))
-        x += [*along, *along[::-1], None]
-        y += [*upper, *lower[::-1], None]
-    line = {"color": "@band", "width": 1}  # a frame alone is seen too
-    look = {"fill": "toself", "fillcolor": "@band", "line": line, "hoverinfo": "skip"}
-    return scatter("95 % interval", "lines", x, y, **look)
 
 
 def _stretches(places: Sequence[int], starts: Set[int]) -> list[Sequence[int]]:

@@ -68,9 +68,9 @@ def take_pictures(subject: Subject) -> Pictures:
     level, _ = _attempt(lambda: _level(subject, disparity))
     makers: dict[str, Callable[[], NDArray[Any] | None]] = {
         "road": lambda: _road(subject, source),
-        "map": lambda: draw_disparity(_required(disparity)),
-        "map_counts": lambda: _counts(_required(disparity), _required(disparity)),
-        "level": lambda: draw_disparity(_required(level)),
+        "map": lambda: None if disparity is None else draw_disparity(disparity),
+        "map_counts": lambda: None if disparity is None else _counts(disparity, disparity),
+        "level": lambda: None if level is None else draw_disparity(level),
         "level_counts": lambda: _level_counts(subject, disparity, level),
         "heights": lambda: _heights(subject, source),
     }
@@ -95,8 +95,6 @@ def _attempt(make: Callable[[], Made]) -> tuple[Made | None, str]:
 def _source(subject: Subject) -> Source:
     if "disparity" in subject.images:
         return Source(read_disparity(subject.images["disparity"]))
-    if subject.images_only:
-        raise InputError(f"{subject.frame.file}: there is no map of it among the images")
     if subject.refused:
         raise InputError(subject.refused)
     # a pair's left image is kept where the road is to be drawn on it
@@ -127,27 +125,28 @@ def _road(subject: Subject, source: Source | None) -> NDArray[Any] | None:
     return draw_road(source.shown, found.road_mask, source.photo)
 
 
-def _level(subject: Subject, disparity: NDArray[Any] | None) -> NDArray[Any]:
+def _level(subject: Subject, disparity: NDArray[Any] | None) -> NDArray[Any] | None:
     """Return the map de-rotated: as `estimate` wrote it, else made."""
     if "derotated" in subject.images:
         stored, given = read_stored(subject.images["derotated"]), subject.options.encoding
         encoding = "auto" if subject.frame.right_file else given.encoding
         return to_disparity(stored, encoding=encoding, scale=given.scale, invalid=given.invalid).disparity
-    return derotate(_required(disparity), subject.theta)
+    return None if disparity is None else derotate(disparity, subject.theta)
 
 
 def _level_counts(
     subject: Subject, disparity: NDArray[Any] | None, level: NDArray[Any] | None
-) -> NDArray[Any]:
+) -> NDArray[Any] | None:
     if "vdisparity" in subject.images:
         return read_image(subject.images["vdisparity"])
-    level = _required(level)
+    if level is None:
+        return None
     height, width = level.shape
     scale = level if disparity is None else disparity
-    return _counts(level, scale, subject.alpha, row_offset(subject.theta, width, height))
+    return _counts(level, scale, subject.row.alpha, row_offset(subject.theta, width, height))
 
 
-def _heights(subject: Subject, source: Source | None) -> NDArray[Any]:
+def _heights(subject: Subject, source: Source | None) -> NDArray[Any] | None:
     """Draw the heights over the road: as `estimate` drew or wrote them, else those of the map.
 
     Of a map they are in metres where there is a calibration or the row has the camera's height.
@@ -160,12 +159,11 @@ def _heights(subject: Subject, source: Source | None) -> NDArray[Any]:
     if "heights" in subject.images:
         written = read_stored(subject.images["heights"]).values.astype(np.float32)
         return draw_heights(written, span, unit, photo)
-    disparity = _required(None if source is None else source.shown)
-    calibration = _calibration(subject, disparity)
+    calibration = None if source is None else _calibration(subject, source.shown)
     road = FittedRoad.of_row(subject.row, calibration)
-    if road is None:
-        raise InputError(f"{subject.frame.file}: its row has no road")
-    heights = heights_over(disparity, road, calibration)
+    if source is None or road is None:
+        return None
+    heights = heights_over(source.shown, road, calibration)
     if unit_of(calibration) == METRES:
         unit = METRES
     else:
@@ -184,12 +182,6 @@ def _counts(
     bins = min(histogram.counts.shape[1], _MOST_BINS)
     counted = v_disparity(disparity, bins=bins, max_disparity=histogram.max_disparity)
     return draw_v_disparity(counted, alpha, offset)
-
-
-def _required(made: NDArray[Any] | None) -> NDArray[Any]:
-    if made is None:
-        raise InputError("there is no map to make it from")
-    return made
 
 
 def _encoded(picture: NDArray[Any]) -> Picture:

@@ -2,7 +2,6 @@
 
 import contextlib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rollcli.errors import ExitStatus, UsageError
@@ -162,11 +161,8 @@ def _subjects(
         made = recorded_options(part.run, run_path(part.path))
         mine = {place: row for place, owner, row in chosen if owner == number}
         if mine or len(parts) == 1:
-            of_part = subjects([*mine.values()], part.path, options.images, made, fetch=options.fetch)
             calibrations = recorded_calibrations(part.run)
-            if len(calibrations) == 1:
-                of_part = [
-                    replace(each, frame=replace(each.frame, calibration=calibrations[0])) for each in of_part
-                ]
-            found |= dict(zip(mine, of_part, strict=True))
+            one = calibrations[0] if len(calibrations) == 1 else None  # else each frame has its own
+            of_part = subjects([*mine.values()], part.path, options.images, made, one, fetch=options.fetch)
+            found |= zip(mine, of_part, strict=True)
     return [found[place] for place, _, _ in chosen]

@@ -3,17 +3,17 @@
 import bisect
 import math
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from rollcli.errors import UsageError
-from rollcli.estimator.road.model import Parabola
 from rollcli.files.atomic import is_file, is_folder
 from rollcli.files.containers import frame_name
 from rollcli.files.naming import listed
 from rollcli.files.results import Row
 from rollcli.files.search import MAP_ENDINGS, objects_behind
 from rollcli.files.stores.locations import base_name, is_remote, is_url, store_of
+from rollcli.rig.calibration import Calibration
 from rollcli.run.frame import Frame, frame_of_row
 from rollcli.run.options import KINDS, FrameOptions, ImageKind, ImageOptions
 from rollcli.simulate.options import TRUTH
@@ -71,34 +71,36 @@ class Subject:
     ----------
     frame : Frame
         Where its map or its pair is.
-    theta : float
-        What its map is turned by, radians.
-    alpha : tuple of float, or None
-        The road's parabola, px.
     images : dict of str to str
         The files that `estimate` wrote for it, by kind.
     row : Row
         What the result says of it.
     options : FrameOptions
         How its result was made.
-    images_only : bool
-        Whether pictures come from these alone: a result from elsewhere may name any file.
     refused : str
         Why the inputs are not read; empty where they may be.
     """
 
     frame: Frame
-    theta: float
-    alpha: Parabola | None
     images: dict[str, str]
     row: Row
     options: FrameOptions
-    images_only: bool = False
     refused: str = ""
+
+    @property
+    def theta(self) -> float:
+        """What its map is turned by, radians."""
+        return math.radians(self.row.map_roll_deg or 0.0)
 
 
 def subjects(
-    rows: Sequence[Row], result: str, images: str | None, options: FrameOptions, *, fetch: bool = False
+    rows: Sequence[Row],
+    result: str,
+    images: str | None,
+    options: FrameOptions,
+    calibration: Calibration | None = None,
+    *,
+    fetch: bool = False,
 ) -> list[Subject]:
     """Find the files of rows that have an angle.
 
@@ -111,6 +113,8 @@ def subjects(
         The folder of images, or of folders of images, that `estimate` wrote.
     options : FrameOptions
         How the result was made, and which folders the run wrote images to.
+    calibration : Calibration or None
+        Of all rows.
     fetch : bool
         Whether inputs are asked for in whichever store a row names: a result from elsewhere may name a
         service of this network, or a bucket that the user's keys open. By default only in the result's own.
@@ -128,26 +132,23 @@ def subjects(
             f"{images}: has no image of {listed(without)}: name the folder where estimate has put what it "
             "wrote, or leave --images out to have the pictures made from the inputs"
         )
-    only = images is not None
+    frames = [replace(frame_of_row(row, result), calibration=calibration) for row in rows]
     return [
-        Subject(
-            frame_of_row(row, result),
-            math.radians(row.map_roll_deg or 0.0),
-            row.alpha,
-            files,
-            row,
-            options,
-            images_only=only,
-            refused="" if fetch else _refusal(row, result),
-        )
-        for row, files in zip(rows, found, strict=True)
+        Subject(frame, files, row, options, _refusal(row, result, there, fetch))
+        for frame, files, row in zip(frames, found, rows, strict=True)
     ]
 
 
-def _refusal(row: Row, result: str) -> str:
-    """Say why a row's inputs are not asked for; empty where they are local or lie in the result's store."""
+def _refusal(row: Row, result: str, images: "_ImageFolder | None", fetch: bool) -> str:
+    """Say why a row's inputs are not read; empty where they are local or lie in the result's store.
+
+    Where there are images, pictures come from these alone: a result from elsewhere may name any file.
+    """
+    if images is not None:
+        return f"{row.file}: there is no map of it among the images"
     for name in filter(None, (row.file, row.right_file)):
-        if is_remote(name) and not (is_url(name) and is_url(result) and store_of(name) == store_of(result)):
+        followed = fetch or (is_url(name) and is_url(result) and store_of(name) == store_of(result))
+        if is_remote(name) and not followed:
             return f"{name}: is remote, and the result does not lie there; --fetch follows it"
     return ""
 

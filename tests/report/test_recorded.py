@@ -2,6 +2,7 @@
 
 import html
 import json
+import math
 import os
 import re
 import tempfile
@@ -351,7 +352,7 @@ def _looked_for(rows, there="", images=None, derotated=None, result="rolls.csv",
     if isinstance(found, str):
         return found
     paths = [[each.frame.path, each.frame.right_path.replace(os.sep, "/")] for each in found]
-    return [[*two, one.images, one.images_only] for two, one in zip(paths, found, strict=True)]
+    return [[*two, one.images, one.refused] for two, one in zip(paths, found, strict=True)]
 
 
 def _subjects():
@@ -361,7 +362,7 @@ def _subjects():
     there = "up/run/a.png heights/a.tif vdisparity/a.png vdisparity/b.c.png disparity/a.npy road_mask/b.png"
     with folder_of(f"out/{each}" for each in f"{there} road_mask/m_000002.png".split()):
         return [
-            [each.theta, each.alpha, each.images_only, each.refused, sorted(each.images.items())]
+            [each.theta, each.row.alpha, each.refused, sorted(each.images.items())]
             for each in subjects(
                 rows, "rolls.csv", "out/", FrameOptions(images=ImageOptions(derotated="a/up"))
             )
@@ -410,13 +411,13 @@ KERB = np.maximum(0.4 * (np.mgrid[:120, :160][0] - 20), 0)
 KERB[70:110, 20:140] += 3
 
 
-def _taken(images=(), disparity=ROAD, roll=5.75, camera=None, **options):
+def _taken(images=(), disparity=ROAD, roll=5.75, camera=None, alpha0=-8.0, **options):
     """The pictures of a map, coarsely: letters are left out, and their files lose a little."""
     with tempfile.TemporaryDirectory() as folder:
         for name in ("a", "up", "mm"):
             np.save(f"{folder}/{name}.npy", disparity / (1 if name == "a" else 20))
         cv2.imwrite(f"{folder}/photo.png", np.random.default_rng(1).integers(0, 256, (60, 80, 3), np.uint8))
-        given = replace(row(f"{folder}/a.npy", roll), alpha0=-8.0, alpha1=0.4, height_m=camera)
+        given = replace(row(f"{folder}/a.npy", roll), alpha0=alpha0, alpha1=0.4, height_m=camera)
         given = replace(given, width=disparity.shape[1], height=disparity.shape[0])
         drawn = ImageOptions(heights_range=(-0.3, 0.3))
         settings = FrameOptions(encoding=EncodingOptions("px"), images=drawn)
@@ -446,18 +447,18 @@ TAKEN = {
             ("road_mask", "photo.png"),
             ("vdisparity", "photo.png"),
         ],
-        images_only=True,
+        refused="no map",
     ),
-    "of a preview": partial(_taken, [("heights_preview", "photo.png")], images_only=True),
+    "of a preview": partial(_taken, [("heights_preview", "photo.png")], refused="no map"),
     "of nothing": partial(_taken, refused="it is far away"),
-    "of a map among images": partial(_taken, [("disparity", "a.npy")], camera=1.5, images_only=True),
-    "of no parabola": partial(_taken, alpha=None),
+    "of a map among images": partial(_taken, [("disparity", "a.npy")], camera=1.5, refused="no map"),
+    "of no parabola": partial(_taken, alpha0=None),
     "of another size": partial(_taken, row=replace(row("a.png"), width=80)),
-    "turned back": partial(_taken, theta=-0.5),
+    "turned back": partial(_taken, roll=math.degrees(-0.5)),
     "of a kerb": partial(_taken, disparity=KERB, roll=0.0),
     "of a kerb and a height": partial(_taken, disparity=KERB, roll=0.0, camera=2.0),
-    "of a large map": partial(_taken, disparity=road_map(0.02, width=1280, height=400), alpha=None),
-    "of a larger map": partial(_taken, disparity=road_map(0.02, width=1600, height=400), alpha=None),
+    "of a large map": partial(_taken, disparity=road_map(0.02, width=1280, height=400)),
+    "of a larger map": partial(_taken, disparity=road_map(0.02, width=1600, height=400)),
 }
 CASES = {
     **{f"charts: {name}": partial(_charts, name) for name in RESULTS},
