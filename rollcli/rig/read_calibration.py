@@ -15,13 +15,13 @@ MAX_BYTES = 1 << 20  # real ones have a few thousand
 
 
 class Format(NamedTuple):
-    """How a format is recognised by its text, and how one file of it is read.
+    """How a format is recognised, and how one file of it is read.
 
     `files` is how many files make a calibration at most: `read` takes so many.
     """
 
     name: str
-    recognise: Callable[[str], bool]
+    recognise: Callable[[File], bool]
     read: Callable[..., Fields]
     files: int = 1
 
@@ -101,15 +101,13 @@ def _text(name: str, data: bytes) -> File:
 def _read(files: Sequence[File]) -> Fields:
     forms = []
     for file in files:
-        form = next((each for each in FORMATS if each.recognise(file.text)), None)
+        form = next((each for each in FORMATS if each.recognise(file)), None)
         if form is None:
             known = ", ".join(each.name for each in FORMATS)
-            raise InputError(f"{file.name}: is no calibration of a known format ({known})")
+            raise file.error(f"is no calibration of a known format ({known})")
         forms.append(form)
     if len(files) > min(form.files for form in forms) or len(set(forms)) > 1:
-        raise InputError(
-            f"{files[1].name}: only a pair of ROS camera_info files is given as two --calib; give one file"
-        )
+        raise files[1].error("only a pair of ROS camera_info files is given as two --calib; give one file")
     return forms[0].read(*files)
 
 

@@ -11,20 +11,7 @@ calibration.pdf): *_camera.json with intrinsic {fx, fy, u0, v0} and extrinsic {b
 from collections.abc import Mapping
 from dataclasses import replace
 
-from rollcli.errors import InputError
-from rollcli.rig.formats.fields import (
-    Fields,
-    File,
-    Projection,
-    json_values,
-    keys_and_values,
-    number,
-    numbers,
-    pair_of,
-    require_one_pair,
-    size_of,
-    swapped,
-)
+from rollcli.rig.formats.fields import Fields, File
 
 _RAW = {f"P_rect_0{view}" for view in range(4)}
 _BENCHMARK = {f"P{view}" for view in range(4)}
@@ -34,12 +21,12 @@ _MM = 1e-3
 _SAME_DOFFS = 0.5  # px
 
 
-def is_kitti(text: str) -> bool:
-    """Tell whether a text is one of KITTI's calibrations."""
+def is_kitti(file: File) -> bool:
+    """Tell whether a file is one of KITTI's calibrations."""
     return any(
         # ROS and OpenCV name a matrix P1 as well; its value is no plain number
         key in _RAW or (key in _BENCHMARK and value[:1] in tuple("-+.0123456789na"))
-        for key, value in keys_and_values(text, ":")
+        for key, value in file.lines(":")
     )
 
 
@@ -50,8 +37,8 @@ def read_kitti(file: File) -> Fields:
     pairs = [pair for pair in (_GREY, _COLOUR) if all(key.format(view) in values for view in pair)]
     if not pairs:
         views = ", ".join(sorted((_RAW | _BENCHMARK) & values.keys()))
-        raise InputError(
-            f"{file.name}: has only {views}: the projections of both views are needed, "
+        raise file.error(
+            f"has only {views}: the projections of both views are needed, "
             f"{key.format(0)} and {key.format(1)} or {key.format(2)} and {key.format(3)}"
         )
     size_key = f"S_rect_0{pairs[0][0]}"
@@ -73,78 +60,73 @@ def read_driving_stereo(file: File) -> Fields:
     values = _kitti_values(file)
     missing = [key for key in DRIVING_STEREO if key not in values]
     if missing:
-        raise InputError(f"{file.name}: has no {missing[0]}: the file is cut off")
+        raise file.error(f"has no {missing[0]}: the file is cut off")
     return _kitti_fields(file, values, "S_rect_101", *DRIVING_STEREO)
 
 
 def _kitti_values(file: File) -> dict[str, str]:
     values: dict[str, str] = {}
-    for key, value in keys_and_values(file.text, ":"):
+    for key, value in file.lines(":"):
         if key in values and values[key] != value and key.startswith("P"):
-            raise InputError(f"{file.name}: is contradictory: it gives {key} twice")
+            raise file.error(f"is contradictory: it gives {key} twice")
         values[key] = value
     return values
 
 
 def _kitti_fields(file: File, values: Mapping[str, str], size_key: str, left: str, right: str) -> Fields:
     """Return the left view, the baseline in metres, doffs, and the size where it is stated."""
-    views = [
-        Projection.of(numbers(values[key].split(), f"{file.name}: {key}"), f"{file.name}: {key}")
-        for key in (left, right)
-    ]
-    baseline, doffs = pair_of(views[0], views[1], file.name)
-    if baseline < 0:
-        raise swapped(file.name)
-    stated, what = values.get(size_key, "").split(), f"{file.name}: {size_key}"
+    found = file.pair(*(file.projection(values[key].split(), key) for key in (left, right)))
+    if found.baseline is not None and found.baseline < 0:
+        raise file.swapped()
+    stated = values.get(size_key, "").split()
     if len(stated) not in (0, 2):
-        raise InputError(f"{what} has {len(stated)} numbers: width and height are needed")
-    width, height = stated or (None, None)
-    return Fields(*views[0][:4], baseline, doffs, *size_of(width, height, what))
+        raise file.error(f"{size_key} has {len(stated)} numbers: width and height are needed")
+    width, height = file.size(stated[0], stated[1], size_key) if stated else (None, None)
+    return replace(found, width=width, height=height)
 
 
 def read_middlebury(file: File) -> Fields:
     """Read the left camera, the baseline and doffs."""
-    values = dict(keys_and_values(file.text, "="))
-    fx, fy, cx, cy = _camera(values["cam0"], f"{file.name}: cam0")
-    right = _camera(values["cam1"], f"{file.name}: cam1") if "cam1" in values else None
-    doffs = number(values["doffs"], f"{file.name}: doffs") if "doffs" in values else None
-    if right is not None:
-        require_one_pair((fx, fy, cy), (right[0], right[1], right[3]), file.name)
+    values = dict(file.lines("="))
+    fx, fy, cx, cy = _camera(file, values, "cam0")
+    doffs = file.number(values["doffs"], "doffs") if "doffs" in values else None
+    if "cam1" in values:
+        right = _camera(file, values, "cam1")
+        file.require_one_pair((fx, fy, cy), (right[0], right[1], right[3]))
         between = right[2] - cx
         if doffs is not None and abs(doffs - between) > _SAME_DOFFS:
-            raise InputError(
-                f"{file.name}: is contradictory: doffs is {doffs:g} px, its cameras differ by {between:g} px"
-            )
+            raise file.error(f"is contradictory: doffs is {doffs:g} px, its cameras differ by {between:g} px")
         doffs = between if doffs is None else doffs
     if "baseline" not in values:
         return Fields(fx, fy, cx, cy, None, doffs, lacks="has no baseline: the file is cut off")
-    baseline = _MM * number(values["baseline"], f"{file.name}: baseline")
-    found = size_of(values.get("width"), values.get("height"), f"{file.name}: width and height")
-    return Fields(fx, fy, cx, cy, baseline, doffs or 0.0, *found)
+    baseline = _MM * file.number(values["baseline"], "baseline")
+    size = file.size(values.get("width"), values.get("height"), "width and height")
+    return Fields(fx, fy, cx, cy, baseline, doffs or 0.0, *size)
 
 
-def _camera(text: str, what: str) -> tuple[float, float, float, float]:
+def _camera(file: File, values: Mapping[str, str], key: str) -> tuple[float, float, float, float]:
     """Return fx, fy, cx, cy of [fx 0 cx; 0 fy cy; 0 0 1]."""
-    found = numbers(text.strip("[]").replace(";", " ").split(), what)
+    text = values[key]
+    found = file.numbers(text.strip("[]").replace(";", " ").split(), key)
     if len(found) != 9 or not text.endswith("]") or found[6:] != [0, 0, 1]:
-        raise InputError(f"{what} is no 3x3 camera matrix: the file is cut off or damaged")
+        raise file.error(f"{key} is no 3x3 camera matrix: the file is cut off or damaged")
     return found[0], found[4], found[2], found[5]
 
 
-def is_cityscapes(text: str) -> bool:
-    """Tell whether a text is a calibration of Cityscapes."""
-    return '"intrinsic"' in text and '"u0"' in text
+def is_cityscapes(file: File) -> bool:
+    """Tell whether a file is a calibration of Cityscapes."""
+    return '"intrinsic"' in file.text and '"u0"' in file.text
 
 
 def read_cityscapes(file: File) -> Fields:
     """Read the camera and the baseline."""
-    values = json_values(file)
+    values = file.json()
     found = []
     for name, keys in (("intrinsic", ("fx", "fy", "u0", "v0")), ("extrinsic", ("baseline",))):
         table = values.get(name)
         for key in keys:
             if not isinstance(table, dict) or key not in table:
-                raise InputError(f"{file.name}: has no {key}")
-            found.append(number(table[key], f"{file.name}: {key}"))
+                raise file.error(f"has no {key}")
+            found.append(file.number(table[key], key))
     fx, fy, cx, cy, baseline = found
     return Fields(fx, fy, cx, cy, baseline, 0.0)

@@ -2,23 +2,16 @@
 
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from rollcli.errors import InputError
-from rollcli.rig.formats.yaml import Value
+from rollcli.rig.formats.yaml import Value, parse_yaml
 
 _LONGEST = 40  # characters of a number: no calibration has more digits
 _SAME_FOCAL = 1e-3  # relative: the views of a rectified pair have one focal length
 _SAME_ROW = 0.5  # px: and one row of the principal point
-
-
-class File(NamedTuple):
-    """The text of a calibration file, and what errors call it."""
-
-    name: str
-    text: str
 
 
 @dataclass(frozen=True)
@@ -55,115 +48,121 @@ class Projection(NamedTuple):
     tx: float
     ty: float
 
-    @classmethod
-    def of(cls, numbers: Sequence[float], what: str) -> "Projection":
-        """Read a 3x4 projection, row by row.
+
+class File(NamedTuple):
+    """A calibration file, or a pair of them: its text, and what errors call it."""
+
+    name: str
+    text: str
+
+    def error(self, why: str) -> InputError:
+        """Return the error that says why the file is not read."""
+        return InputError(f"{self.name}: {why}")
+
+    def lines(self, sign: str) -> Iterator[tuple[str, str]]:
+        """Yield key and value of each line that has the sign between them."""
+        for line in self.text.splitlines():
+            key, found, value = line.partition(sign)
+            if found:
+                yield key.strip(), value.strip()
+
+    def yaml(self) -> dict[str, Value]:
+        """Return the values of a YAML document; see `parse_yaml`."""
+        return parse_yaml(self.text, self.name)
+
+    def json(self) -> dict[str, Value]:
+        """Return the values of a JSON object, numbers as text."""
+        try:
+            # as text: Python reads numbers of thousands of digits slowly, or refuses them
+            values = json.loads(self.text, parse_int=str, parse_float=str, parse_constant=str)
+        except (ValueError, RecursionError) as error:
+            raise self.error(f"is not whole JSON: {error}") from error
+        if not isinstance(values, dict):
+            raise self.error("is no JSON object")
+        return values
+
+    def number(self, value: Value, key: str) -> float:
+        """Return the finite number that a text is."""
+        shown = value if isinstance(value, str) else "not a number"
+        try:
+            found = float(shown[: _LONGEST + 1])
+        except ValueError:
+            found = math.nan
+        if len(shown) > _LONGEST or not math.isfinite(found):
+            raise self.error(f"{key} is {shown[:_LONGEST]!r}: a finite number is needed")
+        return found
+
+    def numbers(self, values: Value | Iterable[str], key: str) -> list[float]:
+        """Return the finite numbers of a list."""
+        if isinstance(values, str | dict):
+            raise self.error(f"{key} is not a list of numbers")
+        return [self.number(value, key) for value in values]
+
+    def size(self, width: Value | None, height: Value | None, key: str) -> tuple[int | None, int | None]:
+        """Return an image size in whole pixels; None where a side is not stated."""
+        if width is None or height is None:
+            return None, None
+        found = self.number(width, key), self.number(height, key)
+        if not all(1 <= side <= 1e6 and side == int(side) for side in found):
+            raise self.error(f"{key} is {found[0]:g}x{found[1]:g} px: that is no image")
+        return int(found[0]), int(found[1])
+
+    def projection(self, values: Value | Iterable[str], key: str) -> Projection:
+        """Return the view of a 3x4 projection, row by row.
 
         The fourth column is K t with all three components of t: dividing its first number by the focal
         length is 0.3 % off for KITTI's colour cameras.
         """
-        if len(numbers) != 12:
-            raise InputError(f"{what} has {len(numbers)} numbers: a 3x4 projection has 12")
-        fx, skew, cx, px, zero, fy, cy, py, *last, tz = numbers
+        found = self.numbers(values, key)
+        if len(found) != 12:
+            raise self.error(f"{key} has {len(found)} numbers: a 3x4 projection has 12")
+        fx, skew, cx, px, zero, fy, cy, py, *last, tz = found
         if last != [0, 0, 1] or zero != 0 or skew != 0 or fx == 0 or fy == 0:
-            raise InputError(f"{what} is no projection of a rectified view")
-        return cls(fx, fy, cx, cy, (px - cx * tz) / fx, (py - cy * tz) / fy)
+            raise self.error(f"{key} is no projection of a rectified view")
+        return Projection(fx, fy, cx, cy, (px - cx * tz) / fx, (py - cy * tz) / fy)
+
+    def pair(self, left: Projection, right: Projection) -> Fields:
+        """Return what the two views of a rectified pair say, the baseline in the unit of the projections.
+
+        It is negative where the right view's camera stands left of the other.
+
+        Raises
+        ------
+        InputError
+            The views are one above the other, or they do not belong to one rectified pair.
+        """
+        across, up = left.tx - right.tx, left.ty - right.ty
+        if abs(up) > abs(across):
+            raise self.vertical()
+        if across == 0:
+            raise self.error("has no distance between the cameras: its projections are the same")
+        self.require_one_pair((left.fx, left.fy, left.cy), (right.fx, right.fy, right.cy))
+        return Fields(left.fx, left.fy, left.cx, left.cy, across, right.cx - left.cx)
+
+    def require_one_pair(self, *views: tuple[float, float, float]) -> None:
+        """Refuse two views, each (fx, fy, cy), that are not those of one rectified pair.
+
+        Raises
+        ------
+        InputError
+        """
+        tolerances = (_SAME_FOCAL * abs(views[0][0]), _SAME_FOCAL * abs(views[0][1]), _SAME_ROW)
+        if any(abs(a - b) > most for a, b, most in zip(*views, tolerances, strict=True)):
+            one, other = (", ".join(f"{value:g}" for value in view) for view in views)
+            raise self.error(
+                f"is contradictory: fx, fy and cy of the two views are {one} and {other} px, "
+                "and those of a rectified pair are equal"
+            )
+
+    def vertical(self) -> InputError:
+        """Return the error for cameras one above the other."""
+        return self.error("is a vertical rig, one camera above the other: only horizontal ones are read")
+
+    def swapped(self) -> InputError:
+        """Return the error for a right camera that stands left of the left one."""
+        return self.error("is contradictory: its right camera stands left of its left one; are they swapped?")
 
 
-def keys_and_values(text: str, sign: str) -> Iterator[tuple[str, str]]:
-    """Yield key and value of each line that has the sign between them."""
-    for line in text.splitlines():
-        key, found, value = line.partition(sign)
-        if found:
-            yield key.strip(), value.strip()
-
-
-def has_key(sign: str, *keys: str) -> Callable[[str], bool]:
-    """Return what tells whether a line of a text gives one of these keys a value."""
-    return lambda text: any(key in keys for key, _ in keys_and_values(text, sign))
-
-
-def json_values(file: File) -> dict[str, Value]:
-    """Return the values of a JSON object, numbers as text."""
-    try:
-        # as text: Python reads numbers of thousands of digits slowly, or refuses them
-        values = json.loads(file.text, parse_int=str, parse_float=str, parse_constant=str)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{file.name}: is not whole JSON: {error}") from error
-    if not isinstance(values, dict):
-        raise InputError(f"{file.name}: is no JSON object")
-    return values
-
-
-def number(value: Value, what: str) -> float:
-    """Return the finite number that a text is."""
-    if isinstance(value, str) and len(value) <= _LONGEST:
-        try:
-            found = float(value)
-        except ValueError:
-            found = math.nan
-        if math.isfinite(found):
-            return found
-    shown = value if isinstance(value, str) else "not a number"
-    raise InputError(f"{what} is {shown[:_LONGEST]!r}: a finite number is needed")
-
-
-def numbers(values: Value | Iterable[str], what: str) -> list[float]:
-    """Return the finite numbers of a list."""
-    if isinstance(values, str | dict):
-        raise InputError(f"{what} is not a list of numbers")
-    return [number(value, what) for value in values]
-
-
-def size_of(width: Value | None, height: Value | None, what: str) -> tuple[int | None, int | None]:
-    """Return an image size in whole pixels; None where a side is not stated."""
-    if width is None or height is None:
-        return None, None
-    found = number(width, what), number(height, what)
-    if not all(1 <= side <= 1e6 and side == int(side) for side in found):
-        raise InputError(f"{what} is {found[0]:g}x{found[1]:g} px: that is no image")
-    return int(found[0]), int(found[1])
-
-
-def pair_of(left: Projection, right: Projection, where: str) -> tuple[float, float]:
-    """Return baseline, in the unit of the projections, and doffs of two rectified views.
-
-    The baseline is negative where the right view's camera stands left of the other.
-
-    Raises
-    ------
-    InputError
-        The views are one above the other, or they do not belong to one rectified pair.
-    """
-    across, up = left.tx - right.tx, left.ty - right.ty
-    if abs(up) > abs(across):
-        raise InputError(
-            f"{where} is a vertical rig, one camera above the other: only horizontal ones are read"
-        )
-    if across == 0:
-        raise InputError(f"{where} has no distance between the cameras: its projections are the same")
-    require_one_pair((left.fx, left.fy, left.cy), (right.fx, right.fy, right.cy), where)
-    return across, right.cx - left.cx
-
-
-def require_one_pair(left: tuple[float, float, float], right: tuple[float, float, float], where: str) -> None:
-    """Refuse two views, each (fx, fy, cy), that are not those of one rectified pair.
-
-    Raises
-    ------
-    InputError
-    """
-    tolerances = (_SAME_FOCAL * abs(left[0]), _SAME_FOCAL * abs(left[1]), _SAME_ROW)
-    if any(abs(a - b) > most for a, b, most in zip(left, right, tolerances, strict=True)):
-        one, other = (", ".join(f"{value:g}" for value in view) for view in (left, right))
-        raise InputError(
-            f"{where} is contradictory: fx, fy and cy of the two views are {one} and {other} px, "
-            "and those of a rectified pair are equal"
-        )
-
-
-def swapped(where: str) -> InputError:
-    """Return the error for a right camera that stands left of the left one."""
-    return InputError(
-        f"{where} is contradictory: its right camera stands left of its left one; are they swapped?"
-    )
+def has_key(sign: str, *keys: str) -> Callable[[File], bool]:
+    """Return what tells whether a line of a file gives one of these keys a value."""
+    return lambda file: any(key in keys for key, _ in file.lines(sign))
