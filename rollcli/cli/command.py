@@ -5,7 +5,6 @@ command that has such an option. Keys in a table, such as ``[estimate]`` or ``[e
 that command alone.
 """
 
-import functools
 import inspect
 import os
 import re
@@ -22,7 +21,8 @@ from rollcli.files.bounded import MOST_SETTINGS, as_utf8, read_given
 from rollcli.messages import say, show_tracebacks
 
 OTHER = "Other options"
-Declaration = Callable[[Callable[..., Any]], Callable[..., Any]]
+Function = Callable[..., Any]
+Declaration = Callable[[Function], Function]
 _ALWAYS = (ExitStatus.FAILED, ExitStatus.USAGE, ExitStatus.INTERRUPTED)
 _OF_FRAMES = {each: each.meaning for each in (ExitStatus.DONE, ExitStatus.FRAMES_FAILED)}
 
@@ -187,7 +187,7 @@ def record(
     Parameters
     ----------
     name : str
-        The command's parameter that receives the record.
+        What the command's own record, or its function, calls it.
     title : str
         The heading in the help.
     make : callable
@@ -198,7 +198,7 @@ def record(
         See `Option`.
     """
 
-    def declare(function: Callable[..., Any]) -> Callable[..., Any]:
+    def declare(function: Function) -> Function:
         count = len(getattr(function, "__click_params__", ()))
         for each in reversed(declarations):
             each(function)
@@ -206,14 +206,8 @@ def record(
         for param in params:
             if isinstance(param, Option):
                 param.section, param.only_with = title, (*only_with, *param.only_with)
-        field_of = _fill(params, make)
-
-        @functools.wraps(function)  # its parameters, too
-        def gathered(**values: Any) -> Any:
-            values[name] = make(**{field: values.pop(each) for each, field in field_of.items()})
-            return function(**values)
-
-        return gathered
+        vars(function).setdefault("__records__", {})[name] = make, _fill(params, make)
+        return function
 
     return declare
 
@@ -251,24 +245,35 @@ def _fill(params: Sequence[click.Parameter], record: Any) -> dict[str, str]:
     return field_of
 
 
-def command(fields: Any = None, **attributes: Any) -> Callable[[Callable[..., Any]], Command]:
-    """Make a command of a function, named after it.
+def command(make: Callable[..., Any] | None = None, **attributes: Any) -> Callable[[Function], Command]:
+    """Make a command of a function, named after it, which returns the exit status.
+
+    The function receives what `make` makes of the records and of the options and arguments that are part of
+    none; those have their defaults and help from its fields, as in `record`. Without `make` it receives them
+    by their names. Every command has --config.
 
     Its docstring is the help; the section Examples has purposes, and indented below each its command, or
-    several steps. `fields` is the record that it makes of its options: those that are part of no smaller one
-    have their defaults and help from there, as in `record`.
+    several steps.
     """
 
-    def make(function: Callable[..., Any]) -> Command:
-        params = getattr(function, "__click_params__", [])[::-1]
-        if fields is not None:
-            _fill([each for each in params if isinstance(each, Option) and not each.help], fields)
+    def declare(function: Function) -> Command:
+        params = [*getattr(function, "__click_params__", [])[::-1], _CONFIG]
+        records = getattr(function, "__records__", {})
+        gathered = {each for _, field_of in records.values() for each in field_of}
+        own = {} if make is None else _fill([each for each in params if each.name not in gathered], make)
+
+        def run(**values: Any) -> None:
+            for name, (of, field_of) in records.items():
+                values[name] = of(**{field: values.pop(each) for each, field in field_of.items()})
+            named = {own.get(name, name): value for name, value in values.items()}
+            click.get_current_context().exit(function(**named) if make is None else function(make(**named)))
+
         text, _, examples = inspect.cleandoc(function.__doc__ or "").partition("\n\nExamples\n--------\n")
         shown = [(purpose, inspect.cleandoc(steps)) for purpose, steps in _EXAMPLE.findall(examples)]
         words: dict[str, Any] = {"help": text, "examples": shown, **attributes}
-        return Command(function.__name__, callback=function, params=params, **words)
+        return Command(function.__name__, callback=run, params=params, **words)
 
-    return make
+    return declare
 
 
 def _tell_idle(ctx: click.Context) -> None:
@@ -290,24 +295,21 @@ def _tell_idle(ctx: click.Context) -> None:
 
 _PROGRAM = "ROLLCLI_"
 _SETTINGS = ("ROLLCLI_STORE_TIMEOUT",)  # of no command
+_ALIKE = 0.85  # names of one command have their beginning in common
 
 
 def _tell_mistaken_variables(ctx: click.Context) -> None:
     """Say which variables name no option of this command, no other command and no setting."""
-    of_command = f"{ctx.auto_envvar_prefix}_"
-    options = [f"{of_command}{str(param.name).upper()}" for param in ctx.command.params]
+    here = f"{ctx.auto_envvar_prefix}_"
+    known = [*_SETTINGS, *(f"{here}{str(param.name).upper()}" for param in ctx.command.params)]
     root = ctx.find_root()
     assert isinstance(root.command, click.Group)
     commands = tuple(f"{_PROGRAM}{name.upper()}_" for name in root.command.list_commands(root))
-    mistaken = {name for name in os.environ if name.startswith(_PROGRAM)} - {*options, *_SETTINGS}
-    for name in sorted(mistaken):
-        same, known, what = of_command, options, f"there is no such option of {ctx.command_path}"
-        if not name.startswith(of_command):
-            same, known, what = _PROGRAM, [*options, *_SETTINGS], "there is no such command or setting"
-        if same == of_command or not name.startswith(commands):
-            rest = {each.removeprefix(same): each for each in known}
-            close = nearest(name.removeprefix(same), rest)
-            say(f"{name}: {what}" + (f"; did you mean {rest[close]}?" if close else ""))
+    for name in sorted({each for each in os.environ if each.startswith(_PROGRAM)}.difference(known)):
+        if name.startswith(here) or not name.startswith(commands):
+            close = nearest(name, known, _ALIKE)
+            hint = f"; did you mean {close}?" if close else ""
+            say(f"{name}: there is no such option of {ctx.command_path}{hint}")
 
 
 def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str:
@@ -414,10 +416,11 @@ def _key(declared: click.Option) -> str:
     return repr(str(declared.name).replace("_", "-"))
 
 
-config_option = option(
-    "--config",
-    FILE,
-    text="TOML file with option names as keys; flags and the environment win over it.",
+_CONFIG = Option(
+    ["--config"],
+    type=FILE,
+    metavar=FILE.metavar,
+    help="TOML file with option names as keys; flags and the environment win over it.",
     is_eager=True,
     expose_value=False,
     callback=_use,

@@ -5,13 +5,12 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import click
 from click.core import ParameterSource
 
 from rollcli.cli import options as shared
-from rollcli.cli.command import Needs, command, config_option, option, record
+from rollcli.cli.command import Needs, command, option, record
 from rollcli.cli.types import FLAG, SHARD, Choice, Number, OutputFile
 from rollcli.messages import without_secrets
 from rollcli.run.options import EstimateOptions, ResultOptions
@@ -101,7 +100,7 @@ result_options = record(
 )
 
 
-@command()
+@command(EstimateOptions)
 @shared.input_options
 @shared.pair_options
 @shared.topic_options
@@ -113,9 +112,7 @@ result_options = record(
 @shared.cluster_options
 @shared.method_options
 @shared.stereo_options
-@config_option
-@click.pass_context
-def estimate(ctx: click.Context, /, **records: Any) -> None:
+def estimate(options: EstimateOptions) -> int:
     """Estimate the roll angle of each disparity map or stereo pair, one row a frame.
 
     \b
@@ -148,8 +145,7 @@ def estimate(ctx: click.Context, /, **records: Any) -> None:
     The paper's setting: every pixel is road
         rollcli estimate crops/ --road all --method gd -o rolls.csv
     """
-    options = EstimateOptions(**records)
-    result = options.result
+    ctx, result = click.get_current_context(), options.result
     resume = result.resume or result.update
     resume, overwrite = one_start(ctx, resume=resume, overwrite=options.running.overwrite)
     options = replace(
@@ -160,4 +156,4 @@ def estimate(ctx: click.Context, /, **records: Any) -> None:
 
     from rollcli.run.estimate import run_estimate
 
-    ctx.exit(run_estimate(options, resume_command=resume_command(ctx)))
+    return run_estimate(options, resume_command=resume_command(ctx))

@@ -1,25 +1,23 @@
 """`rollcli evaluate accuracy` and `rollcli evaluate paper`."""
 
-from typing import Any
+from dataclasses import replace
 
 import click
 
 from rollcli.cli import options as shared
-from rollcli.cli.command import command, config_option, option, record
+from rollcli.cli.command import command, option, record
 from rollcli.cli.types import DIR, FILE, PATH, TABLE_FILE, TABLE_FORMATS, TURNS, Choice, Number, table_format
 from rollcli.evaluate.options import AccuracyOptions, ExperimentOptions, PaperOptions
 
 
-@command(fields=AccuracyOptions, short_help="Errors of a result against known angles.")
+@command(AccuracyOptions, short_help="Errors of a result against known angles.")
 @click.argument("result", type=PATH)
 @option("--truth", FILE, required=True, section="Figures")
 @option("--heights", DIR, section="Figures")
 @option("-o, --output", TABLE_FILE, default="-", section="Figures")
 @option("--format", Choice(*TABLE_FORMATS), section="Figures")
 @shared.running_options
-@config_option
-@click.pass_context
-def accuracy(ctx: click.Context, /, **options: Any) -> None:
+def accuracy(options: AccuracyOptions) -> int:
     """Compare the angles of RESULT, which estimate wrote, with known ones; its heights over the road, too.
 
     Frames are matched by the names of their files, without folder and ending. Those without a partner are
@@ -32,8 +30,7 @@ def accuracy(ctx: click.Context, /, **options: Any) -> None:
     """
     from rollcli.evaluate.accuracy import run_accuracy
 
-    form = table_format(options.pop("format"), options["output"])
-    ctx.exit(run_accuracy(AccuracyOptions(**options, format=form)))
+    return run_accuracy(replace(options, format=table_format(options.format, options.output)))
 
 
 experiment_options = record(
@@ -48,15 +45,13 @@ experiment_options = record(
 )
 
 
-@command(short_help="The paper's tables and figures on your maps.")
+@command(PaperOptions, short_help="The paper's tables and figures on your maps.")
 @shared.input_options
 @experiment_options
 @shared.encoding_options
 @shared.region_options
 @shared.running_options
-@config_option
-@click.pass_context
-def paper(ctx: click.Context, /, **records: Any) -> None:
+def paper(options: PaperOptions) -> int:
     """Repeat the paper's tables and figures on these maps, and write them as CSV and one HTML page of charts.
 
     Iterations and run times of golden section and gradient descent (Tables I and II), first learning rates
@@ -70,7 +65,7 @@ def paper(ctx: click.Context, /, **records: Any) -> None:
     """
     from rollcli.evaluate.paper import run_paper
 
-    ctx.exit(run_paper(PaperOptions(**records)))
+    return run_paper(options)
 
 
 @click.group(invoke_without_command=True)

@@ -1,22 +1,20 @@
 """`rollcli derotate`, `disparity`, `vdisparity` and `heights`: each frame becomes files."""
 
-from typing import Any
-
 import click
 
 from rollcli.cli import options as shared
-from rollcli.cli.command import command, config_option, option
+from rollcli.cli.command import command, option
 from rollcli.cli.types import DIR, FLAG, RESULT, Choice, Number
 from rollcli.run import options as records
 
 
-def _run(ctx: click.Context, options: records.ConvertOptions) -> None:
+def _converted(options: records.ConvertOptions) -> int:
     from rollcli.run.convert import run_conversion
 
-    ctx.exit(run_conversion(options))
+    return run_conversion(options)
 
 
-@command(fields=records.DerotateOptions)
+@command(records.DerotateOptions)
 @shared.input_options
 @option("--roll", Number("DEG", at_least=-180, at_most=180), section="Angle")
 @option("--from", RESULT, section="Angle")
@@ -26,9 +24,7 @@ def _run(ctx: click.Context, options: records.ConvertOptions) -> None:
 @shared.output_folder_option
 @shared.encoding_options
 @shared.cluster_options
-@config_option
-@click.pass_context
-def derotate(ctx: click.Context, /, **options: Any) -> None:
+def derotate(options: records.DerotateOptions) -> int:
     """Rotate disparity maps about their centre by their roll, so that rows of the road become constant.
 
     INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted
@@ -47,11 +43,10 @@ def derotate(ctx: click.Context, /, **options: Any) -> None:
     One angle for all, nothing cut off
         rollcli derotate maps/ --roll 2.5 --expand -o upright/
     """
-    result, roll_deg = options.pop("from"), options.pop("roll")
-    _run(ctx, records.DerotateOptions(**options, result=result, roll_deg=roll_deg))
+    return _converted(options)
 
 
-@command(fields=records.DisparityOptions)
+@command(records.DisparityOptions)
 @shared.pair_input_options
 @shared.pair_options
 @shared.topic_options
@@ -60,9 +55,7 @@ def derotate(ctx: click.Context, /, **options: Any) -> None:
 @option("--preview", DIR, section="Output")
 @shared.stereo_options
 @shared.cluster_options
-@config_option
-@click.pass_context
-def disparity(ctx: click.Context, /, **options: Any) -> None:
+def disparity(options: records.DisparityOptions) -> int:
     """Match rectified stereo pairs with OpenCV SGBM: one disparity map a pair, named after the left image.
 
     Images are PNG, JPEG, TIFF, BMP, PGM or PPM, of 8 or 16 bits, grey or colour. An image without a partner
@@ -78,10 +71,10 @@ def disparity(ctx: click.Context, /, **options: Any) -> None:
     A video that holds both views
         rollcli disparity drive.mp4 --side-by-side -o maps/
     """
-    _run(ctx, records.DisparityOptions(**options))
+    return _converted(options)
 
 
-@command(fields=records.VDisparityOptions)
+@command(records.VDisparityOptions)
 @shared.input_options
 @option("--bins", Number("N", at_least=1, at_most=65535, whole=True), section="Counting")
 @option("--max-disparity", Number("PX", above=0), section="Counting")
@@ -92,9 +85,7 @@ def disparity(ctx: click.Context, /, **options: Any) -> None:
 @shared.encoding_options
 @shared.calibration_options
 @shared.cluster_options
-@config_option
-@click.pass_context
-def vdisparity(ctx: click.Context, /, **options: Any) -> None:
+def vdisparity(options: records.VDisparityOptions) -> int:
     """Draw the v-disparity image of each map: the histogram of each row's disparities.
 
     INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted
@@ -114,10 +105,10 @@ def vdisparity(ctx: click.Context, /, **options: Any) -> None:
     A figure for a paper
         rollcli vdisparity maps/7.png --figure pdf --from rolls.csv -o figures/
     """
-    _run(ctx, records.VDisparityOptions(result=options.pop("from"), **options))
+    return _converted(options)
 
 
-@command(fields=records.HeightsOptions)
+@command(records.HeightsOptions)
 @shared.input_options
 @option("--from", RESULT, required=True, section="Road")
 @option("--skip-suspect", FLAG, section="Road")
@@ -128,9 +119,7 @@ def vdisparity(ctx: click.Context, /, **options: Any) -> None:
 @shared.encoding_options
 @shared.calibration_options
 @shared.cluster_options
-@config_option
-@click.pass_context
-def heights(ctx: click.Context, /, **options: Any) -> None:
+def heights(options: records.HeightsOptions) -> int:
     """Write how high each pixel of disparity maps lies over the road.
 
     INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted
@@ -151,4 +140,4 @@ def heights(ctx: click.Context, /, **options: Any) -> None:
     At once, of stereo pairs too
         rollcli estimate maps/ -o rolls.csv --heights heights/
     """
-    _run(ctx, records.HeightsOptions(result=options.pop("from"), **options))
+    return _converted(options)

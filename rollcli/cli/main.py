@@ -106,19 +106,13 @@ def exit_status(program: Callable[[], Any]) -> int:
 
 
 def _with_hint(error: click.ClickException) -> str:
-    message = _from_environment(error) or error.format_message()
-    ctx = getattr(error, "ctx", None)
+    """Return what is wrong, and where to look; of the value of an environment variable its name."""
+    ctx, message = getattr(error, "ctx", None), error.format_message()
+    if isinstance(error, click.BadParameter) and ctx is not None and error.param is not None:
+        name = str(error.param.name)
+        if ctx.get_parameter_source(name) is click.core.ParameterSource.ENVIRONMENT:
+            message = f"{ctx.auto_envvar_prefix}_{name.upper()}: {error.message}"
     return f"{message} (see '{ctx.command_path} --help')" if ctx is not None else message
-
-
-def _from_environment(error: click.ClickException) -> str:
-    """Name the environment variable whose value is wrong; empty when it is not a variable's."""
-    if not isinstance(error, click.BadParameter) or error.ctx is None or error.param is None:
-        return ""
-    name = str(error.param.name)
-    if error.ctx.get_parameter_source(name) is not click.core.ParameterSource.ENVIRONMENT:
-        return ""
-    return f"{error.ctx.auto_envvar_prefix}_{name.upper()}: {error.message}"
 
 
 @contextlib.contextmanager
@@ -141,30 +135,26 @@ _OPENCV = tuple(f"opencv-{name}python{kind}" for name in ("", "contrib-") for ki
 
 
 def _print_versions(ctx: click.Context, param: click.Parameter, asked: bool) -> None:
-    if asked and not ctx.resilient_parsing:
-        click.echo("\n".join(f"{name} {version}" for name, version in _versions()))
-        ctx.exit()
-
-
-def _versions() -> Iterator[tuple[str, str]]:
-    """Yield (name, version) of rollcli, Python and each package it uses; of extras, those installed."""
+    """Print the versions of rollcli, Python and each package it uses; of extras, of those installed."""
+    if not asked or ctx.resilient_parsing:
+        return
     import platform  # nothing else needs these at each start
     import re
     from importlib import metadata
 
-    yield "rollcli", __version__
-    yield "Python", f"{platform.python_version()} ({platform.python_implementation()}, {platform.platform()})"
-    requirements, found = list[str](), dict[str, tuple[str, str]]()
+    python = f"{platform.python_version()} ({platform.python_implementation()}, {platform.platform()})"
+    requirements, found = list[str](), {"rollcli": f"rollcli {__version__}", "Python": f"Python {python}"}
     with contextlib.suppress(metadata.PackageNotFoundError):  # it may run from its folder, not installed
         requirements = metadata.requires("rollcli") or []
     for requirement in requirements:
         name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
         for package in _OPENCV if name in _OPENCV else (name,):  # several that hold the same module
             with contextlib.suppress(metadata.PackageNotFoundError):
-                found.setdefault(name, (package, metadata.version(package)))
+                found.setdefault(name, f"{package} {metadata.version(package)}")
         if ";" not in requirement:
-            found.setdefault(name, (name, "not installed"))
-    yield from found.values()
+            found.setdefault(name, f"{name} not installed")
+    click.echo("\n".join(found.values()))
+    ctx.exit()
 
 
 @click.group(

@@ -1,11 +1,9 @@
 """`rollcli report`: make an HTML page of a result."""
 
-from typing import Any
-
 import click
 
 from rollcli.cli import options as shared
-from rollcli.cli.command import Needs, command, config_option, option
+from rollcli.cli.command import Needs, command, option
 from rollcli.cli.types import DIR, FLAG, PATH, Number, OutputFile, Text
 from rollcli.errors import ExitStatus
 from rollcli.report.options import ReportOptions
@@ -14,7 +12,7 @@ _PAGE = Needs(lambda ctx: ctx.params["output"], "only a page has pictures: name 
 
 
 @command(
-    fields=ReportOptions,
+    ReportOptions,
     statuses={
         ExitStatus.DONE: "the page and the charts are written",
         ExitStatus.FRAMES_FAILED: "they are written, and pictures of at least one frame cannot be made",
@@ -30,9 +28,7 @@ _PAGE = Needs(lambda ctx: ctx.params["output"], "only a page has pictures: name 
 @option("--pdf", DIR, section="Charts for slides")
 @option("--png", DIR, section="Charts for slides")
 @shared.running_options
-@config_option
-@click.pass_context
-def report(ctx: click.Context, /, **options: Any) -> None:
+def report(options: ReportOptions) -> int:
     """Make an HTML page of RESULTS, which `rollcli estimate` wrote: one, several, or the shards of one run.
 
     It shows the roll over the frames with its 95 % interval, suspect and failed frames marked; how often
@@ -57,4 +53,4 @@ def report(ctx: click.Context, /, **options: Any) -> None:
     """
     from rollcli.report.run import run_report
 
-    ctx.exit(run_report(ReportOptions(**options)))
+    return run_report(options)

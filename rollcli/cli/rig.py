@@ -1,11 +1,11 @@
 """`rollcli rig`: what the frames of a result say about the rig."""
 
-from typing import Any
+from dataclasses import replace
 
 import click
 
 from rollcli.cli import options as shared
-from rollcli.cli.command import command, config_option, option, record
+from rollcli.cli.command import command, option, record
 from rollcli.cli.types import FILE, FLAG, PATH, TABLE_FILE, TABLE_FORMATS, Choice, Number, Text, table_format
 from rollcli.errors import ExitStatus
 from rollcli.run.options import GateOptions, RigOptions
@@ -27,7 +27,7 @@ gate_options = record(
 
 
 @command(
-    fields=RigOptions,
+    RigOptions,
     statuses={
         ExitStatus.DONE: "the rig is assessed, and every check holds",
         ExitStatus.CHECK_FAILED: "at least one check has failed; a line for each says which frames",
@@ -44,9 +44,7 @@ gate_options = record(
 @shared.calibration_options
 @gate_options
 @shared.running_options
-@config_option
-@click.pass_context
-def rig(ctx: click.Context, /, **options: Any) -> None:
+def rig(options: RigOptions) -> int:
     """Say how the rig is mounted, whether it has drifted, and when it has jumped.
 
     RESULTS are results of `rollcli estimate`, or the shards of one run. Neighbouring frames are alike: the
@@ -67,5 +65,4 @@ def rig(ctx: click.Context, /, **options: Any) -> None:
     """
     from rollcli.run.rig import run_rig
 
-    form = table_format(options.pop("format"), options["output"])
-    ctx.exit(run_rig(RigOptions(**options, format=form)))
+    return run_rig(replace(options, format=table_format(options.format, options.output)))

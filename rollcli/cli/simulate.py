@@ -5,7 +5,7 @@ from dataclasses import replace
 import click
 
 from rollcli.cli import options as shared
-from rollcli.cli.command import command, config_option, option, record
+from rollcli.cli.command import command, option, record
 from rollcli.cli.estimate import one_start, resume_command
 from rollcli.cli.types import DIR, FLAG, IMAGE_SIZE, POINT, Choice, Number, span
 from rollcli.run.options import RunningOptions
@@ -45,9 +45,7 @@ simulate_options = record(
 @click.argument("folder", type=DIR, metavar="DIR")
 @simulate_options
 @shared.running_options
-@config_option
-@click.pass_context
-def simulate(ctx: click.Context, /, folder: str, options: SimulateOptions, running: RunningOptions) -> None:
+def simulate(folder: str, options: SimulateOptions, running: RunningOptions) -> int:
     """Render road stereo pairs with known roll into DIR.
 
     Writes DIR/left and DIR/right (8-bit PNG), DIR/disparity (the true disparity of the left view, 16-bit
@@ -63,6 +61,7 @@ def simulate(ctx: click.Context, /, folder: str, options: SimulateOptions, runni
     """
     from rollcli.simulate.dataset import run_simulate
 
+    ctx = click.get_current_context()
     resume, overwrite = one_start(ctx, resume=options.resume, overwrite=running.overwrite)
     options, running = replace(options, resume=resume), running._replace(overwrite=overwrite)
-    ctx.exit(run_simulate(folder, options, running, resume_command(ctx)))
+    return run_simulate(folder, options, running, resume_command(ctx))
