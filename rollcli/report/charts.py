@@ -40,31 +40,25 @@ class FrameAxis:
 
     Attributes
     ----------
-    places : sequence of float, or None
-        Of each frame, in the unit; None: the numbers of frames, from 1.
+    places : sequence of float
+        Of each frame, in the unit, or its number, from 1.
     unit : str
         "s", "min" or "h" since the first frame; empty for numbers.
     """
 
-    count: int
-    places: Sequence[float] | None = None
+    places: Sequence[float]
     unit: str = ""
-
-    def at(self, number: float) -> float:
-        """Return the place of a frame, counted from 1; of half a number the middle between two."""
-        if self.places is None:
-            return number
-        return (self.places[math.floor(number) - 1] + self.places[math.ceil(number) - 1]) / 2
 
     def layout(self) -> dict[str, Any]:
         """Return the axis as plotly takes it."""
-        if self.places is not None:
+        if self.unit:
             last = self.places[-1]  # the first stands at 0
             span = [-0.01 * last, last + 0.01 * last]
             return {"title": {"text": f"time, {self.unit}"}, "range": span, "zeroline": False}
-        margin = max(0.5, 0.01 * self.count)
-        span = [1 - margin, self.count + margin]
-        few = {"dtick": 1} if self.count <= _FEW else {}  # there are no half frames
+        count = len(self.places)
+        margin = max(0.5, 0.01 * count)
+        few = {"dtick": 1} if count <= _FEW else {}  # there are no half frames
+        span = [1 - margin, count + margin]
         return {"title": {"text": "frame"}, "range": span, "zeroline": False, "tickformat": ",d", **few}
 
 
@@ -73,18 +67,18 @@ def frame_axis(rows: Sequence[Row], rig: RigAssessment) -> FrameAxis:
 
     What stands for the broken end of a recording has no stamp, and stands where the frame before it does.
     """
-    seconds = seconds_of([row.file for row in rows])
+    seconds, numbers = seconds_of([row.file for row in rows]), FrameAxis(range(1, len(rows) + 1))
     known = np.isfinite(seconds)
     ends = np.array([is_rest(row.file) for row in rows], bool)
     if not (len(rows) and known[0] and (known | ends).all()):
-        return FrameAxis(len(rows))
+        return numbers
     seconds = seconds[np.maximum.accumulate(np.where(known, np.arange(len(rows)), 0))]
     taken = sum(float(np.ptp(seconds[drive.frames])) for drive in rig.drives if len(drive.frames))
     whole = float(seconds[-1] - seconds[0])
     if (np.diff(seconds) < 0).any() or not taken > _LEAST_SHARE * whole:
-        return FrameAxis(len(rows))
+        return numbers
     unit, size, _ = next(each for each in _UNITS if whole >= each[2])
-    return FrameAxis(len(rows), np.round(seconds / size, _DECIMALS).tolist(), unit)
+    return FrameAxis(np.round(seconds / size, _DECIMALS).tolist(), unit)
 
 
 def drive_starts(rig: RigAssessment) -> set[int]:
@@ -123,7 +117,7 @@ def rig_traces(
         for segment in found.segments if found is not None else ():
             if segment.mean.value is None or segment.first == segment.last:  # a frame alone is its own mean
                 continue
-            first, last = (axis.at(int(drive.frames[place]) + 1) for place in (segment.first, segment.last))
+            first, last = (axis.places[drive.frames[place]] for place in (segment.first, segment.last))
             said = f"mounting {name} {answer(segment.end, quantity)}, of {segment.used:,} frames"
             level = [each.value or 0.0 for each in (segment.begin, segment.end)]
             _add(means, [first, last], level, said)
@@ -132,7 +126,7 @@ def rig_traces(
         for jump in found.jumps if found is not None else ():
             frame = int(drive.frames[jump.frame])
             said = f"jump by {answer(jump.change, quantity, change=True)} at {rig.names[frame]}"
-            _add(jumps, [axis.at(frame + 0.5)] * 2, ends, said)
+            _add(jumps, [sum(axis.places[frame - 1 : frame + 1]) / 2] * 2, ends, said)
     return [trace for trace in (band, means, jumps) if trace["x"]]
 
 
@@ -256,8 +250,8 @@ def alignment(rows: Sequence[Row], rig: RigAssessment) -> Chart:
     axis = frame_axis(rows, rig)
     for place, (quantity, (words, colour)) in enumerate(zip(ALIGNMENT, _PARTS, strict=True)):
         known = [
-            (axis.at(number), row, float(value), _shift_of(place, row))
-            for number, row in enumerate(rows, 1)
+            (at, row, float(value), _shift_of(place, row))
+            for at, row in zip(axis.places, rows, strict=True)
             if (value := getattr(row, quantity.column)) is not None and row.height and row.width
         ]
         x, y = [at for at, *_ in known], [round(value * each, 3) for _, _, value, each in known]
@@ -317,12 +311,11 @@ def chart_over_frames(rows: Sequence[Row], quantity: Quantity, rig: RigAssessmen
         for status in ("ok", "suspect")
     )
     failed = [at for at, row in enumerate(rows) if row.status == "error"]
-    along = [axis.at(number) for number in range(1, len(rows) + 1)]
     many = len(rows) > _MANY
 
     def marks(name: str, places: Sequence[int | None], mode: str = "markers", **look: Any) -> Trace:
         """Return the frames at some places among the rows; None parts a line."""
-        x = [None if at is None else along[at] for at in places]
+        x = [None if at is None else axis.places[at] for at in places]
         y = [None if at is None else values[at] for at in places]
         said = [
             None if at is None else label(rows[at], with_interval(values[at], halves[at], quantity))
@@ -338,7 +331,7 @@ def chart_over_frames(rows: Sequence[Row], quantity: Quantity, rig: RigAssessmen
     stretches = _stretches(sure, starts)
     band = _trace("95 % interval", **_BAND, line={"color": "@band", "width": 1})  # a frame alone is seen too
     for stretch in _stretches([at for at in sure if halves[at] is not None], starts):
-        _add_band(band, *([each[at] for at in stretch] for each in (along, values, halves)))
+        _add_band(band, *([each[at] for at in stretch] for each in (axis.places, values, halves)))
     line = {"line": {"color": "@c1", "width": 1.5}, "marker": {"color": "@c1"}}
     # a browser takes a second for 10,000 dots, which a line of so many frames would hide anyway
     alone = [stretch[0] for stretch in stretches if many and len(stretch) == 1]

@@ -9,22 +9,15 @@ from rollcli.files.naming import listed
 from rollcli.files.results import Result, Row
 from rollcli.files.stores.locations import public_name
 from rollcli.messages import counted
+from rollcli.report import summary as said
 from rollcli.report.charts import frame_axis, outside
 from rollcli.report.figures import with_still
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import Chart, render_page, script_json
 from rollcli.report.pictures import Pictures
-from rollcli.report.summary import (
-    degrees,
-    input_folders,
-    option_lines,
-    summarize,
-    with_interval,
-    written_at,
-)
+from rollcli.rig import words
 from rollcli.rig.drive.assess import RigAssessment
 from rollcli.rig.quantities import QUANTITIES
-from rollcli.rig.words import answer, counts, decimals, findings, now_in_words
 from rollcli.run.resume import recorded_calibrations, recorded_options
 from rollcli.run.rig_gates import NOT_SEEN, Health, health_of
 
@@ -37,7 +30,7 @@ def report_page(
     charts: Mapping[str, Chart],
 ) -> bytes:
     """Return the page, HTML, UTF-8."""
-    rows, run, summary = result.rows, result.run or {}, summarize(result.rows)
+    rows, run = result.rows, result.run or {}
     doubtful = sorted(
         ((number, row) for number, row in enumerate(rows, 1) if row.status != "ok"),
         key=lambda each: each[1].status,  # errors before suspects
@@ -48,24 +41,20 @@ def report_page(
         *("page", "report", "frames"),
         title=options.title or f"Roll of {counted(len(rows), 'frame')}",
         result=listed(map(public_name, options.results)),
-        version=run.get("rollcli"),
         page_version=__version__,
-        summary=summary,
-        degrees=degrees,
-        with_interval=with_interval,
-        decimals=decimals,
-        folders=input_folders(rows),
-        written=max(map(written_at, options.results)),
-        options=option_lines(result.run),
+        said=said,
+        words=words,
+        rig=rig,
+        frames=rows,
+        run=run,
+        summary=said.summarize(rows),
+        written=max(map(said.written_at, options.results)),
         encodings=", ".join(map(str, run["encoding"])) if isinstance(run.get("encoding"), list) else "",
         charts={name: with_still(chart) for name, chart in charts.items()},
-        answer=answer(rig.now()).replace("-", "−"),
-        now=now_in_words(rig),
+        answer=words.answer(rig.now()).replace("-", "−"),
         others=_others(rig),
-        counts=counts(rig),
         health=_health(rig, run),
         not_seen=NOT_SEEN,
-        findings=findings(rig) or ["Neither a jump nor a drift is seen."],
         outside=outside(rows),
         doubtful=doubtful,
         rows=_table(rows, rig),
@@ -88,9 +77,9 @@ def _others(rig: RigAssessment) -> list[str]:
     others = []
     for quantity in QUANTITIES[1:]:
         if rig.latest(quantity) is not None:
-            since, value = now_in_words(rig, quantity), answer(rig.now(quantity), quantity)
-            words = f"{quantity.name} {value.replace('-', '−')}"
-            others.append(words if since == now_in_words(rig) else f"{words} {since}".rstrip())
+            since, value = words.now_in_words(rig, quantity), words.answer(rig.now(quantity), quantity)
+            told = f"{quantity.name} {value.replace('-', '−')}"
+            others.append(told if since == words.now_in_words(rig) else f"{told} {since}".rstrip())
     return others
 
 
@@ -105,9 +94,10 @@ def _table(rows: Sequence[Row], rig: RigAssessment) -> str:
             row.file.encode("utf-8", "replace").decode(),
             "failed" if row.status == "error" else row.status,
             row.roll_deg,
-            with_interval(row.roll_deg, row.roll_ci95_deg),
+            said.with_interval(row.roll_deg, row.roll_ci95_deg),
             row.message,
         )
         for number, row in enumerate(rows, 1)
     ]
-    return script_json({"rows": lines, "places": frame_axis(rows, rig).places})
+    axis = frame_axis(rows, rig)
+    return script_json({"rows": lines, "places": axis.places if axis.unit else None})

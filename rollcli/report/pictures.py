@@ -45,20 +45,18 @@ class Picture:
 
 @dataclass(frozen=True)
 class Pictures:
-    """The pictures of a frame; where there is no map to show, `missing` says why."""
+    """The pictures of a frame.
 
-    road: Picture | None = None
-    map: Picture | None = None
-    map_counts: Picture | None = None
-    level: Picture | None = None
-    level_counts: Picture | None = None
-    heights: Picture | None = None
+    Attributes
+    ----------
+    made : dict of str to Picture
+        Those that there are of "road", "map", "map_counts", "level", "level_counts" and "heights".
+    missing : str
+        Why there is no map to show.
+    """
+
+    made: dict[str, Picture]
     missing: str = ""
-
-    @property
-    def empty(self) -> bool:
-        """There is nothing to show at all."""
-        return self.road is self.map is self.level is self.level_counts is self.heights is None
 
 
 def take_pictures(subject: Subject) -> Pictures:
@@ -74,15 +72,13 @@ def take_pictures(subject: Subject) -> Pictures:
         "level_counts": lambda: _level_counts(subject, disparity, level),
         "heights": lambda: _heights(subject, source),
     }
-    made = {name: _attempt(make)[0] for name, make in makers.items()}
-    return Pictures(
-        **{name: _encoded(each) for name, each in made.items() if each is not None}, missing=missing
-    )
+    drawn = {name: _attempt(make)[0] for name, make in makers.items()}
+    return Pictures({name: _encoded(each) for name, each in drawn.items() if each is not None}, missing)
 
 
 def no_pictures(_: Subject, reason: str) -> Pictures:
     """Those of a frame whose worker died."""
-    return Pictures(missing=reason)
+    return Pictures({}, reason)
 
 
 def _attempt(make: Callable[[], Made]) -> tuple[Made | None, str]:

@@ -65,13 +65,13 @@ def run_report(options: ReportOptions) -> ExitStatus:
     owners, rows = zip(*owned, strict=True)
     result = Result(rows, common_run([part.run for part in parts]))
     rig = assess_rig(rows, origins=origins)
-    jumps = [
+    jumps = {
         int(drive.frames[jump.frame])
         for drive in rig.drives
         for found in drive.quantities.values()
         for jump in found.jumps
-    ]
-    chosen = choose(rows, options.gallery if options.output is not None else 0, sorted({*jumps}))
+    }
+    chosen = choose(rows, options.gallery if options.output is not None else 0, sorted(jumps))
     found = _subjects(parts, [(place, owners[place], rows[place]) for place in chosen], options)
     reads = [path for each in found for path in (*each.frame.reads(), *each.images.values())]
     page = [] if options.output is None or is_stream(options.output) else [options.output]
@@ -122,7 +122,7 @@ def _write(
         return ExitStatus.DONE
     page = report_page(result, options, list(zip(chosen.items(), pictures, strict=True)), rig, charts)
     write_output(options.output, page, overwrite=options.running.overwrite)
-    missing = [each.missing for each in pictures if each.empty]
+    missing = [each.missing for each in pictures if not each.made]
     for reason in missing[:_REASONS]:
         progress.say(f"no picture of {reason}")
     if missing:

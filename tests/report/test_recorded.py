@@ -171,7 +171,7 @@ def _axis(seconds, *, name="m.mcap#/left@{}", first=1_700_000_000 * NS, pause=No
     counts = [len(rows)] if pause is None else [pause, len(rows) - pause]
     _, found = _assessed(rows, *({"roll": sequence(each)} for each in counts))
     axis = frame_axis(rows, found)
-    return [axis.places, axis.unit, axis.layout(), *map(axis.at, (1, 1.5, len(rows)))]
+    return [[*axis.places], axis.unit, axis.layout()]
 
 
 AXES = {
@@ -296,7 +296,7 @@ _ROWS = re.compile(r'id="rows">(.*?)</script>')
 _STILL = re.compile(r'<svg class="still.*?</svg>', re.DOTALL)
 
 
-NO_PICTURES = Pictures(missing="it is gone")
+NO_PICTURES = Pictures({}, "it is gone")
 
 
 def _page(name, *, run=None, count=0, taken=NO_PICTURES, **options):
@@ -320,12 +320,19 @@ def _rows(table):
     return [*rows[:_MANY], *rows[_MANY :: _MANY // 2], places]
 
 
-WHOLE = Pictures(*(Picture(bytes([each]), 20 + each, 10) for each in range(6)))
+KINDS = ("road", "map", "map_counts", "level", "level_counts", "heights")
+WHOLE = {name: Picture(bytes([each]), 20 + each, 10) for each, name in enumerate(KINDS)}
+
+
+def _without(*names):
+    return {name: each for name, each in WHOLE.items() if name not in names}
+
+
 PAGES = {
-    "one": partial(_page, "one", count=3, taken=WHOLE, title="Rig <7>"),
+    "one": partial(_page, "one", count=3, taken=Pictures(WHOLE), title="Rig <7>"),
     "failed": partial(_page, "failed", count=3, run={"encoding": "px", "options": {}}),
-    "mixed": partial(_page, "mixed", count=4, run=RUN, taken=replace(WHOLE, map=None, missing="no map")),
-    "drives": partial(_page, "drives", count=9, taken=replace(WHOLE, heights=None, road=None)),
+    "mixed": partial(_page, "mixed", count=4, run=RUN, taken=Pictures(_without("map"), "no map")),
+    "drives": partial(_page, "drives", count=9, taken=Pictures(_without("heights", "road"))),
     "long": partial(_page, "long", count=12),
     "pairs": partial(_page, "pairs", run=RUN, count=16),
     "pairs without a calibration": partial(_page, "pairs", run={"calibration": {"first": []}}),
@@ -425,8 +432,8 @@ def _taken(images=(), disparity=ROAD, roll=5.75, camera=None, alpha0=-8.0, **opt
         subject = replace(subject, images={kind: f"{folder}/{name}" for kind, name in images}, **options)
         with mock.patch.object(cv2, "putText", lambda picture, *_: picture):
             found = pictures.take_pictures(subject)
-    shown = {name: each and _seen(each) for name, each in vars(found).items() if name != "missing"}
-    return {**shown, "missing": found.missing.replace(folder, ""), "empty": found.empty}
+    shown = {name: _seen(found.made[name]) if name in found.made else None for name in KINDS}
+    return {**shown, "missing": found.missing.replace(folder, ""), "empty": not found.made}
 
 
 def _seen(picture):
@@ -436,19 +443,12 @@ def _seen(picture):
     return {"size": [picture.width, picture.height, *values.shape], "colours": coarse.ravel().tolist()}
 
 
+PHOTO = "photo.png"
+WRITTEN = [("derotated", "up.npy"), ("heights", "mm.npy"), ("road_mask", PHOTO), ("vdisparity", PHOTO)]
 TAKEN = {
     "of a map": _taken,
     "of a map and a height": partial(_taken, camera=2.0),
-    "of images": partial(
-        _taken,
-        [
-            ("derotated", "up.npy"),
-            ("heights", "mm.npy"),
-            ("road_mask", "photo.png"),
-            ("vdisparity", "photo.png"),
-        ],
-        refused="no map",
-    ),
+    "of images": partial(_taken, WRITTEN, refused="no map"),
     "of a preview": partial(_taken, [("heights_preview", "photo.png")], refused="no map"),
     "of nothing": partial(_taken, refused="it is far away"),
     "of a map among images": partial(_taken, [("disparity", "a.npy")], camera=1.5, refused="no map"),
