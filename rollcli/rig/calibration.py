@@ -98,8 +98,6 @@ class Calibration:
         if self.baseline is not None:
             self._require("a baseline", self.baseline, *_BASELINE, "m")
         if self.width is not None and self.height is not None:
-            if not (self.width > 0 and self.height > 0):
-                raise UsageError(f"{self.source}: an image of {self.width}x{self.height} px has no pixels")
             self.require_inside(self.width, self.height)
 
     def _require(self, what: str, value: float, least: float, most: float, unit: str) -> None:

@@ -11,7 +11,7 @@ from rollcli.rig.formats.fields import Fields, File, has_key
 
 Known = TypeVar("Known", Fields, Calibration)
 
-MAX_BYTES = 1 << 20  # real ones have a few thousand
+MAX_BYTES = 1 << 20  # to be read of a file; real ones have a few thousand
 
 
 class Format(NamedTuple):
@@ -90,8 +90,6 @@ def _source(files: str, given: CalibrationOptions) -> str:
 
 
 def _text(name: str, data: bytes) -> File:
-    if len(data) > MAX_BYTES:
-        raise InputError(f"{name}: has {len(data)} bytes; no calibration is larger than {MAX_BYTES >> 20} MB")
     try:
         return File(name, data.decode("utf-8-sig"))
     except UnicodeDecodeError:
@@ -121,13 +119,9 @@ def _overridden(known: Known, given: CalibrationOptions) -> Known:
 
 def _complete(fields: Fields, source: str, file: str) -> Calibration:
     """Return the calibration; refuse one without what a pose needs."""
-    missing = [
-        option
-        for option, value in (("--focal PX", fields.fx), ("--principal-point CX,CY", fields.cx))
-        if value is None
-    ]
-    if fields.baseline is None and fields.lacks:
-        missing.append("--baseline M")
+    missing = ["--focal PX"] if fields.fx is None else []
+    missing += ["--principal-point CX,CY"] if fields.cx is None else []
+    missing += ["--baseline M"] if fields.baseline is None and fields.lacks else []
     if missing:
         start = f"{file}: {fields.lacks or 'says too little'}" if file else "the calibration is not complete"
         raise UsageError(f"{start}; add {' and '.join(missing)}")

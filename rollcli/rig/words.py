@@ -1,7 +1,6 @@
 """An assessment in words: what people read in the table, on stderr and on the page."""
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
@@ -119,30 +118,24 @@ def findings(rig: RigAssessment, *, roll: bool = True) -> list[str]:
     """
     sentences = []
     for place, drive in enumerate(rig.drives):
+        name = rig.name_of(drive)
         if drive.differs:
             before = rig.name_of(rig.drives[place - 1])
-            sentences.append(
-                f"{rig.name_of(drive)} differs from {before} by {answer(drive.change, change=True)}"
-            )
+            sentences.append(f"{name} differs from {before} by {answer(drive.change, change=True)}")
+        where = f" of {name}" if len(rig.drives) > 1 and drive.name else ""
         for quantity in (*QUANTITIES, *ALIGNMENT):
             found = drive.quantities.get(quantity.name)
-            if found is not None:
-                sentences += _of_one(rig, drive, quantity, found, moved=roll or quantity is not ROLL)
+            if found is None:
+                continue
+            told = roll or quantity is not ROLL
+            for jump in found.jumps if told else ():
+                change, at = answer(jump.change, quantity, change=True), frame_name(rig, drive, jump.frame)
+                sentences.append(f"{quantity.name} jumped by {change} at {at}")
+            if found.drifts and told:
+                sentences.append(f"{quantity.name}{where} drifted by {drift_in_words(rig, drive, quantity)}")
+            if found.now.ci95 is None and quantity in QUANTITIES:
+                sentences.append(f"no interval for the {quantity.name}{where}: {too_few(found, quantity)}")
     return sentences
-
-
-def _of_one(
-    rig: RigAssessment, drive: DriveAssessment, quantity: Quantity, found: SequenceAssessment, *, moved: bool
-) -> Iterator[str]:
-    """Return the sentences of one quantity of one drive."""
-    where = f" of {rig.name_of(drive)}" if len(rig.drives) > 1 and drive.name else ""
-    for jump in found.jumps if moved else ():
-        change = answer(jump.change, quantity, change=True)
-        yield f"{quantity.name} jumped by {change} at {frame_name(rig, drive, jump.frame)}"
-    if found.drifts and moved:
-        yield f"{quantity.name}{where} drifted by {drift_in_words(rig, drive, quantity)}"
-    if found.now.ci95 is None and quantity in QUANTITIES:
-        yield f"no interval for the {quantity.name}{where}: {too_few(found, quantity)}"
 
 
 def too_few(found: SequenceAssessment, quantity: Quantity = ROLL) -> str:

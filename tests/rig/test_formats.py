@@ -10,6 +10,7 @@ import pytest
 from rollcli.errors import InputError, RollcliError
 from rollcli.rig.calibration import CalibrationOptions
 from rollcli.rig.read_calibration import parse_calibration
+from rollcli.run.find import read_calibration
 from tests.rig import calibration_files as samples
 from tests.rig.calibration_files import Rig
 
@@ -82,11 +83,11 @@ def test_what_opencv_itself_writes_is_read_and_swapped_cameras_are_told(tmp_path
     assert "its right camera stands left of its left one" in refusal(rectified(path, -shift, names)[1])
 
 
-def test_bytes_that_are_no_text_and_large_files_are_refused():
-    with pytest.raises(InputError, match="not text"):
-        parse_calibration([("c", b"P0: \xff\xfe\x00")])
-    with pytest.raises(InputError, match="larger"):
-        parse_calibration([("c", b" " * (1 << 20 | 1))])
+def test_bytes_that_are_no_text_and_large_files_are_refused(tmp_path):
+    for data, reason in ((b"P0: \xff\xfe\x00", "is not text"), (b" " * (1 << 20 | 1), "up to 1 MB")):
+        (tmp_path / "c").write_bytes(data)
+        with pytest.raises(InputError, match=reason):
+            read_calibration(tmp_path / "c")
 
 
 ROS_HEAD = "projection_matrix:\n"

@@ -45,14 +45,10 @@ def drive_of(file: str) -> str:
 
 def seconds_of(files: Sequence[str]) -> NDArray[np.float64]:
     """Return when frames were taken, s since the first stamp, shape (N,); NaN for names without a stamp."""
-    stamps = [_stamp(file) for file in files]
+    found = [_FRAME.match(file) if "#" in file else None for file in files]
+    stamps = [None if each is None or each[2] is None else int(each[2]) for each in found]
     first = next((each for each in stamps if each is not None), 0)
     return np.array([np.nan if each is None else (each - first) * _NS for each in stamps])
-
-
-def _stamp(file: str) -> int | None:
-    found = _FRAME.match(file) if "#" in file else None
-    return None if found is None or found[2] is None else int(found[2])
 
 
 def split_drives(
@@ -229,11 +225,8 @@ class RigAssessment:
 
     def latest_drive(self, quantity: Quantity = ROLL) -> DriveAssessment | None:
         """Return the last drive in which a quantity has any value, or None."""
-        for drive in reversed(self.drives):
-            found = drive.quantities.get(quantity.name)
-            if found is not None and found.used:
-                return drive
-        return None
+        having = (each for each in reversed(self.drives) if quantity.name in each.quantities)
+        return next((each for each in having if each.quantities[quantity.name].used), None)
 
     def latest(self, quantity: Quantity = ROLL) -> SequenceAssessment | None:
         """Return the assessment of a quantity in the last drive in which it has any value, or None."""
@@ -338,11 +331,11 @@ def short_names(files: Sequence[str]) -> list[str]:
 def _kinds(frames: RigFrames) -> list[str]:
     """Return what tells frames of one folder apart: the result, and the size where there are several."""
     count = len(frames.files)
-    wide, high = (frames.numbers.get(name, np.full(count, np.nan)) for name in SIZE)
+    sides = [frames.numbers.get(name, np.full(count, np.nan)) for name in SIZE]
     origins = frames.origins or [""] * count
-    if len(np.unique(wide[np.isfinite(wide)])) < 2 and len(np.unique(high[np.isfinite(high)])) < 2:
+    if all(len(np.unique(each[np.isfinite(each)])) < 2 for each in sides):
         return list(origins)
-    sizes = [f"{w:.0f}x{h:.0f}" if w == w else "" for w, h in zip(wide.tolist(), high.tolist(), strict=True)]
+    sizes = (f"{wide:.0f}x{high:.0f}" if wide == wide else "" for wide, high in np.transpose(sides).tolist())
     return [" ".join(filter(None, each)) for each in zip(origins, sizes, strict=True)]
 
 
@@ -398,9 +391,8 @@ def _frames(rows: Any) -> RigFrames:
     if missing := [name for name in ("roll_deg", "status") if name not in rows]:
         raise UsageError(f"the rows have no column {', '.join(missing)}")
     states = np.array(list(map(str, rows["status"])), dtype=str)
-    files = [f"frame {place}" for place in range(len(states))]
-    if "file" in rows:
-        files = list(map(str, rows["file"]))
+    named = rows["file"] if "file" in rows else (f"frame {place}" for place in range(len(states)))
+    files = list(map(str, named))
     numbers = {name: _floats(rows[name]) for name in COLUMNS if name in rows}
     for name, (low, high) in BOUNDS.items():
         values = numbers.get(name, np.empty(0))

@@ -152,6 +152,7 @@ def assess_sequence(values: ArrayLike, errors: ArrayLike, unit: float = 1.0) -> 
     if found.starts:
         likelihood = Likelihood(make_cells(series, found.starts), unit)
     fitted = _Fitted(series, likelihood, found.starts, found.drift)
+    segments = tuple(fitted.segments())
     jumps = tuple(
         Jump(start, fitted.estimate(fitted.level(place + 1, start) - fitted.level(place, start)))
         for place, start in enumerate(found.starts)
@@ -161,12 +162,12 @@ def assess_sequence(values: ArrayLike, errors: ArrayLike, unit: float = 1.0) -> 
         frames=len(given),
         used=used,
         outliers=outliers,
-        segments=tuple(fitted.segments()),
+        segments=segments,
         jumps=jumps,
         drift=(fitted if found.drift else _Fitted(series, likelihood, found.starts, True)).drift(),
         drifts=found.drift,
         status="few" if used < TUNING.fewest else status,
-        between_sd=fitted.between_sd(),
+        between_sd=fitted.between_sd(segments),
         series=series,
         unit=unit,
     )
@@ -208,10 +209,12 @@ class _Fitted:
 
     def segments(self) -> list[Segment]:
         """Return the stretches with their values."""
-        return [
-            Segment(first, end - 1, int(self._series.used[first:end].sum()), *self._values(place, first, end))
-            for place, (first, end) in enumerate(bounds_of(self._starts, self._cells.frames))
-        ]
+        found = []
+        for place, (first, end) in enumerate(bounds_of(self._starts, self._cells.frames)):
+            frames = ((first + end - 1) / 2, first, end - 1)
+            values = (self.estimate(self.level(place, each)) for each in frames)
+            found.append(Segment(first, end - 1, int(self._series.used[first:end].sum()), *values))
+        return found
 
     def mean_over(self, first: int, end: int) -> Estimate:
         """Return the mean of frames whose ends are ends of stretches."""
@@ -224,16 +227,11 @@ class _Fitted:
         levels = [count / total * self.level(place, middle) for place, count in within.items() if total]
         return self.estimate(np.sum(levels, axis=0)) if levels else Estimate()
 
-    def _values(self, place: int, first: int, end: int) -> tuple[Estimate, Estimate, Estimate]:
-        frames = ((first + end - 1) / 2, first, end - 1)
-        mean, begin, last = (self.estimate(self.level(place, each)) for each in frames)
-        return mean, begin, last
-
-    def between_sd(self) -> float:
+    def between_sd(self, segments: Sequence[Segment]) -> float:
         """Return the standard deviation of frames from the fitted level, beyond their own errors."""
         used, frames = self._series.used, np.arange(self._cells.frames)
         level = np.zeros(self._cells.frames)
-        for each in self.segments():
+        for each in segments:
             part = slice(each.first, each.last + 1)
             if each.begin.value is not None and each.end.value is not None:
                 level[part] = np.interp(

@@ -63,9 +63,8 @@ def read_orb_slam(file: File) -> Fields:
         raise file.error(f"has no {keys[0]}")
 
     fx, fy, cx, cy = (read(f"Camera.{each}", f"Camera1.{each}") for each in ("fx", "fy", "cx", "cy"))
-    if fx == 0:
-        raise file.error("Camera.fx is 0: a focal length is more")
-    baseline = read("Camera.bf") / fx if "Camera.bf" in values else read("Stereo.b")
+    # a focal length of 0 is no calibration's
+    baseline = read("Camera.bf") / (fx or 1.0) if "Camera.bf" in values else read("Stereo.b")
     size = file.size(values.get("Camera.width"), values.get("Camera.height"), "Camera.width")
     return Fields(fx, fy, cx, cy, baseline, 0.0, *size)
 
