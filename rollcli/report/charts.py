@@ -25,11 +25,7 @@ Trace = dict[str, Any]
 _FEW = 10  # frames, each with a tick
 _BAND = {"fill": "toself", "fillcolor": "@band", "hoverinfo": "skip"}
 _TEXT = "%{text}<extra></extra>"
-_UNITS = (
-    ("h", 3600.0, 2 * 3600.0),
-    ("min", 60.0, 120.0),
-    ("s", 1.0, 0.0),
-)  # name, seconds, from which time on
+_UNITS = (("h", 3600.0), ("min", 60.0), ("s", 1.0))  # name, seconds; each from two of it on
 _DECIMALS = 7  # of hours less than a thousandth of a second
 _LEAST_SHARE = 0.5  # of the time, that drives take: else the pauses between them would be all that is seen
 
@@ -77,7 +73,7 @@ def frame_axis(rows: Sequence[Row], rig: RigAssessment) -> FrameAxis:
     whole = float(seconds[-1] - seconds[0])
     if (np.diff(seconds) < 0).any() or not taken > _LEAST_SHARE * whole:
         return numbers
-    unit, size, _ = next(each for each in _UNITS if whole >= each[2])
+    unit, size = next((each for each in _UNITS if whole >= 2 * each[1]), _UNITS[-1])
     return FrameAxis(np.round(seconds / size, _DECIMALS).tolist(), unit)
 
 
@@ -250,7 +246,7 @@ def alignment(rows: Sequence[Row], rig: RigAssessment) -> Chart:
     axis = frame_axis(rows, rig)
     for place, (quantity, (words, colour)) in enumerate(zip(ALIGNMENT, _PARTS, strict=True)):
         known = [
-            (at, row, float(value), _shift_of(place, row))
+            (at, row, float(value), _shifts_of_units(row.height, row.width)[place])
             for at, row in zip(axis.places, rows, strict=True)
             if (value := getattr(row, quantity.column)) is not None and row.height and row.width
         ]
@@ -280,11 +276,9 @@ def alignment(rows: Sequence[Row], rig: RigAssessment) -> Chart:
     return Chart("alignment", f"How the right view lies over {len(rows)} frames, px", data, layout)
 
 
-def _shift_of(place: int, row: Row) -> float:
-    """Return by how many pixels a unit of a part of the alignment shifts rows where it does most."""
-    unit = [float(each == place) for each in range(len(ALIGNMENT))]
-    height, width = row.height or 0, row.width or 0
-    return Misalignment.of_values(unit, height, width).shifts(height, width)[place]
+def _shifts_of_units(height: int, width: int) -> tuple[float, ...]:
+    """Return by how many pixels a unit of each part of the alignment shifts rows where it does most."""
+    return Misalignment.of_values((1.0,) * len(ALIGNMENT), height, width).shifts(height, width)
 
 
 def chart_over_frames(rows: Sequence[Row], quantity: Quantity, rig: RigAssessment) -> Chart:

@@ -1,6 +1,7 @@
 """What the page of a report shows, ready to be printed by its template."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from rollcli import __version__
@@ -11,7 +12,7 @@ from rollcli.files.stores.locations import public_name
 from rollcli.messages import counted
 from rollcli.report import summary as said
 from rollcli.report.charts import frame_axis, outside
-from rollcli.report.figures import with_still
+from rollcli.report.figures import stills
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import Chart, render_page, script_json
 from rollcli.report.pictures import Pictures
@@ -50,9 +51,9 @@ def report_page(
         summary=said.summarize(rows),
         written=max(map(said.written_at, options.results)),
         encodings=", ".join(map(str, run["encoding"])) if isinstance(run.get("encoding"), list) else "",
-        charts={name: with_still(chart) for name, chart in charts.items()},
+        charts={name: replace(chart, still=stills(chart)) for name, chart in charts.items()},
         answer=words.answer(rig.now()).replace("-", "−"),
-        others=_others(rig),
+        quantities=QUANTITIES,
         health=_health(rig, run),
         not_seen=NOT_SEEN,
         outside=outside(rows),
@@ -70,17 +71,6 @@ def _health(rig: RigAssessment, run: Mapping[str, Any]) -> Health | None:
         return health_of(rig, calibration, downscale)
     except UsageError:  # where frames have their own, the first may be of another size than the last drive
         return health_of(rig)
-
-
-def _others(rig: RigAssessment) -> list[str]:
-    """Return pitch and height, and since when they hold, where that is not what is said of the roll."""
-    others = []
-    for quantity in QUANTITIES[1:]:
-        if rig.latest(quantity) is not None:
-            since, value = words.now_in_words(rig, quantity), words.answer(rig.now(quantity), quantity)
-            told = f"{quantity.name} {value.replace('-', '−')}"
-            others.append(told if since == words.now_in_words(rig) else f"{told} {since}".rstrip())
-    return others
 
 
 def _table(rows: Sequence[Row], rig: RigAssessment) -> str:

@@ -7,15 +7,12 @@ load: this module is imported once something is to be drawn.
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 from numpy.typing import NDArray
 
@@ -57,7 +54,7 @@ class Drawing:
     @property
     def still(self) -> str:
         """Its pictures for wide and for narrow screens, HTML."""
-        return _stills(self)
+        return stills(self)
 
 
 def chart_file(chart: Chart | Drawing, kind: str, size: Size = SLIDE) -> bytes:
@@ -66,15 +63,11 @@ def chart_file(chart: Chart | Drawing, kind: str, size: Size = SLIDE) -> bytes:
         return figure_file(_drawn(chart, size), kind, chart.label)
 
 
-def with_still(chart: Chart) -> Chart:
-    """Return the chart with its pictures for wide and for narrow screens.
+def stills(chart: Chart | Drawing) -> str:
+    """Return the pictures of a chart for wide and for narrow screens, HTML.
 
     They stand where a page's charts will be, so that a page is whole before any script has run.
     """
-    return replace(chart, still=_stills(chart))
-
-
-def _stills(chart: Chart | Drawing) -> str:
     sizes = (("wide-screen", _WIDE), ("narrow-screen", _NARROW))
     return "".join(_still(chart, name, size) for name, size in sizes)
 
@@ -102,9 +95,9 @@ def _drawn(chart: Chart | Drawing, size: Size) -> Figure:
     scale = size.font / 13  # of widths and marks, which charts give for letters of 13 pixels
     if isinstance(chart, Drawing):
         chart.draw(axes, scale)
-        samples, names = axes.get_legend_handles_labels()
     else:
-        samples, names = _draw_traces(axes, chart, scale)
+        _draw_traces(axes, chart, scale)
+    samples, names = axes.get_legend_handles_labels()
     for side in axes.spines.values():
         side.set_visible(False)
     axes.tick_params(length=0, which="both")
@@ -115,24 +108,23 @@ def _drawn(chart: Chart | Drawing, size: Size) -> Figure:
     return figure
 
 
-def _draw_traces(axes: Axes, chart: Chart, scale: float) -> tuple[list[Artist], list[str]]:
-    """Draw a chart as plotly has it; return what its legend shows, and the names there."""
+def _draw_traces(axes: Axes, chart: Chart, scale: float) -> None:
+    """Draw a chart as plotly has it."""
     base, look = np.zeros(1), dict[str, Any]()
-    for order, trace in enumerate(chart.data, 2):
+    # in the legend by plotly's ranks, on top of each other as they come
+    for order, trace in sorted(enumerate(chart.data, 2), key=lambda each: each[1].get("legendrank", 1000)):
+        name = trace["name"] if chart.layout["showlegend"] and trace.get("showlegend", True) else None
         if trace["type"] == "bar":
             counts = np.asarray(trace["y"], float)
-            look = {"color": colour(trace["marker"]["color"]), "edgecolor": colour("card")}
+            look = {"color": colour(trace["marker"]["color"]), "edgecolor": colour("card"), "label": name}
             axes.bar(trace["x"], counts, trace["width"], base, align="edge", linewidth=scale, **look)
             base = base + counts
         else:
-            _draw_scatter(axes, trace, scale, order)
+            _draw_scatter(axes, trace, scale, order, name)
     for name in "xy":
         _set_axis(axes, name, chart.layout[f"{name}axis"])
     if chart.layout["yaxis"].get("zeroline"):
         axes.axhline(0, color=colour("line"), linewidth=2 * scale, zorder=1)
-    named = [each for each in chart.data if chart.layout["showlegend"] and each.get("showlegend", True)]
-    named.sort(key=lambda each: each.get("legendrank", 1000))  # plotly's rank of a trace that names none
-    return [_sample(each, scale) for each in named], [each["name"] for each in named]
 
 
 def _set_axis(axes: Axes, name: str, layout: Mapping[str, Any]) -> None:
@@ -147,12 +139,14 @@ def _set_axis(axes: Axes, name: str, layout: Mapping[str, Any]) -> None:
     axes.set(**{f"{name}label": layout["title"]["text"], f"{name}lim": layout["range"]})
 
 
-def _draw_scatter(axes: Axes, trace: Trace, scale: float, order: int) -> None:
+def _draw_scatter(axes: Axes, trace: Trace, scale: float, order: int, name: str | None) -> None:
     x, y = (np.array(trace[name], float) for name in "xy")  # NaN where there is no value
     if trace.get("fill"):
         width = trace["line"].get("width", 0) * scale
-        for run in _runs(x, y):
-            axes.fill(*run.T, color=colour(trace["fillcolor"]), linewidth=width, zorder=order)
+        look = {"color": colour(trace["fillcolor"]), "linewidth": width, "zorder": order}
+        areas = [axes.fill(*run.T, **look)[0] for run in _runs(x, y)]
+        for each in areas[:1]:
+            each.set_label(name)
         return
     if "error_y" in trace:
         bars = trace["error_y"]
@@ -162,7 +156,7 @@ def _draw_scatter(axes: Axes, trace: Trace, scale: float, order: int) -> None:
         gap = [[np.nan, np.nan]]
         x, y = np.vstack([part for run in _runs(x, y) for part in (run, gap)]).T
     where: dict[str, Any] = {"transform": axes.get_xaxis_transform()} if trace.get("yaxis") == "y2" else {}
-    axes.plot(x, y, zorder=order, **_look(trace, scale), **where)
+    axes.plot(x, y, zorder=order, label=name, **_look(trace, scale), **where)
 
 
 def _runs(x: NDArray[Any], y: NDArray[Any]) -> Iterator[NDArray[Any]]:
@@ -199,12 +193,6 @@ def _look(trace: Trace, scale: float) -> dict[str, Any]:
         "markerfacecolor": "none" if is_open else paint,
         "markeredgewidth": marker.get("line", {}).get("width", 2) * scale if is_open else 0,
     }
-
-
-def _sample(trace: Trace, scale: float) -> Any:
-    if trace["type"] == "bar" or trace.get("fill"):
-        return Patch(facecolor=colour(trace.get("fillcolor") or trace["marker"]["color"]))
-    return Line2D([], [], **_look(trace, scale))
 
 
 def colour(name: str) -> str:

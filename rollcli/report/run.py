@@ -139,8 +139,8 @@ def _take(found: Sequence[Subject], jobs: int | None) -> "list[Pictures]":
     """Return the pictures of each subject, fewer when interrupted."""
     from rollcli.report.pictures import no_pictures, take_pictures
 
-    names = [each.frame.file for each in found]
-    places = sorted(range(len(names)), key=lambda place: natural_key(names[place]))  # as a video is decoded
+    # as a video is decoded
+    places = sorted(range(len(found)), key=lambda place: natural_key(found[place].frame.file))
     work = Work(take_pictures, no_pictures)
     with stop_on_signals() as stop:
         tasks = run_tasks([found[place] for place in places], work, stop, Workers(jobs))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rollcli.files.results import STATUSES, Row
+from rollcli.files.results import Row
 from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.quantities import ROLL, Quantity
 from rollcli.rig.words import answer
@@ -17,12 +17,11 @@ from rollcli.rig.words import answer
 
 def summarize(rows: Sequence[Row]) -> dict[str, Any]:
     """Take the figures of a result, degrees, by their names in the template; None of what is not there."""
-    found = Counter(row.status for row in rows)
     rolls = [row.roll_deg for row in rows if row.roll_deg is not None]
     widths = [row.roll_ci95_deg for row in rows if row.roll_ci95_deg is not None]
     return {
         "frames": len(rows),
-        "counts": {status: found[status] for status in STATUSES},
+        "counts": Counter(row.status for row in rows),
         "middle": np.percentile(rolls, (5, 95)).tolist() if rolls else None,
         "extremes": (min(rolls), max(rolls)) if rolls else None,
         "half_width": float(np.median(widths)) if widths else None,

@@ -12,7 +12,7 @@ from rollcli.pictures.colours import DARK, LIGHT, style_sheet
 from rollcli.pictures.figures import SLIDE
 from rollcli.report import figures
 from rollcli.report.charts import all_charts
-from rollcli.report.figures import chart_file, with_still
+from rollcli.report.figures import chart_file, stills
 from rollcli.rig.drive.assess import assess_rig
 from tests.report.results import row
 from tests.slow import mostly_slow
@@ -87,7 +87,7 @@ def test_a_value_lies_where_the_axes_say():
 def test_nothing_of_a_files_name_is_in_a_chart():
     rows = [row("]]><script>alert(1)</script>.png", 1.0), row("b.png", None, message="<img onerror=1>")]
     for chart in all_charts(rows, assess_rig(rows)).values():
-        for text in (chart_file(chart, "svg").decode(), with_still(chart).still):
+        for text in (chart_file(chart, "svg").decode(), stills(chart)):
             assert "alert" not in text
             assert "onerror" not in text
 
@@ -145,7 +145,7 @@ def test_every_kind_of_result_has_charts(rows):
 
 
 def test_on_a_page_a_chart_has_two_pictures_in_the_pages_colours_and_font(charts):
-    still = "".join(with_still(chart).still for chart in charts.values())
+    still = "".join(stills(chart) for chart in charts.values())
     found = re.findall(r'<svg class="still (\S+)" viewBox="0 0 (\d+) (\d+)"', still)
     assert found == [("wide-screen", "1000", "368"), ("narrow-screen", "350", "352")] * 2
     assert "var(--c1)" in still

@@ -286,7 +286,7 @@ _LOOK = re.compile(r' ((?:fill|stroke|font|text|class|view|aria)[\w-]*="[^"#]*")
 def _still(chart):
     """The pictures of a page but for their shapes: how lines and letters look, and what is written."""
     figures = pytest.importorskip("rollcli.report.figures", reason="matplotlib is not here")
-    still = figures.with_still(chart).still
+    still = figures.stills(chart)
     written = [html.unescape(each) for each in re.findall(r"<text[^>]*>(.*?)</text>", still)]
     return [sorted(set(_LOOK.findall(still))), written]
 
