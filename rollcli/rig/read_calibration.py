@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, TypeVar
 from rollcli.errors import InputError, UsageError
 from rollcli.rig.calibration import Calibration, CalibrationOptions
 from rollcli.rig.formats import datasets, opencv, robots
-from rollcli.rig.formats.fields import Fields, File, has_key
+from rollcli.rig.formats.fields import Fields, File, has_key, has_text
 
 Known = TypeVar("Known", Fields, Calibration)
 
@@ -34,9 +34,9 @@ FORMATS = (
     Format("ORB-SLAM", has_key(":", "Camera.bf", "Stereo.b"), robots.read_orb_slam),
     Format("ROS camera_info", has_key(":", "projection_matrix"), robots.read_ros, files=2),
     Format("OpenCV stereoRectify", opencv.is_opencv, opencv.read_opencv),
-    Format("Cityscapes", datasets.is_cityscapes, datasets.read_cityscapes),
+    Format("Cityscapes", has_text('"intrinsic"', '"u0"'), datasets.read_cityscapes),
     Format("Kalibr", has_key(":", "T_cn_cnm1"), robots.read_kalibr),
-    Format("ZED", robots.is_zed, robots.read_zed),
+    Format("ZED", has_text("[LEFT_CAM_"), robots.read_zed),
 )
 
 
@@ -81,11 +81,8 @@ def with_numbers(calibration: Calibration, given: CalibrationOptions) -> Calibra
 
 
 def _source(files: str, given: CalibrationOptions) -> str:
-    options = [
-        f"--{name.replace('_', '-')}"
-        for name, value in given._asdict().items()
-        if value is not None and name != "calib"
-    ]
+    numbers = zip(given._fields[1:], given[1:], strict=True)
+    options = [f"--{name.replace('_', '-')}" for name, value in numbers if value is not None]
     return ", ".join(filter(None, [files, *options]))
 
 

@@ -63,16 +63,13 @@ def one_line(rig: RigAssessment) -> str:
 
 def counts(rig: RigAssessment) -> str:
     """Return which frames the answer is from."""
-    left_out = [
-        f"{count:,} {what}"
-        for count, what in (
-            (rig.suspect, "suspect" + (", counted" if rig.include_suspect else "")),
-            (rig.failed, "failed"),
-            (rig.outliers, "far off their neighbours"),
-        )
-        if count
-    ]
-    return ", ".join([f"{rig.used:,} of {counted(rig.count, 'frame')}", *left_out])
+    left_out = {
+        "suspect" + (", counted" if rig.include_suspect else ""): rig.suspect,
+        "failed": rig.failed,
+        "far off their neighbours": rig.outliers,
+    }
+    others = (f"{count:,} {what}" for what, count in left_out.items() if count)
+    return ", ".join([f"{rig.used:,} of {counted(rig.count, 'frame')}", *others])
 
 
 def now_in_words(rig: RigAssessment, quantity: Quantity = ROLL) -> str:

@@ -93,7 +93,7 @@ def segment_rows(rig: RigAssessment) -> Iterator[dict[str, Any]]:
         roll = drive.quantities[ROLL.name]
         means = {ROLL.name: [each.mean for each in roll.segments]}
         for name in {each.name for each in QUANTITIES[1:]} & drive.quantities.keys():
-            means[name] = drive.quantities[name].means(roll.starts)
+            means[name] = drive.quantities[name].means([each.frame for each in roll.jumps])
         for place, segment in enumerate(roll.segments):
             frames = drive.frames[segment.first : segment.last + 1]
             first, last = int(frames[0]), int(frames[-1])

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rollcli.rig.drive.posterior import TUNING, Fit, Flags, Likelihood, Series, correlations_at, make_cells
+from rollcli.rig.drive.posterior import TUNING, Flags, Likelihood, Series, correlations_at, make_cells
 
 _SIDE = 2.5  # cells on each side of a jump that are looked at again
 _FEWEST = 60  # frames on each side: what is beside a jump tells its levels
@@ -80,12 +80,10 @@ class _Search:
             best = less
         return best
 
-    def _fit(self, starts: Sequence[int], drift: bool) -> Fit:
-        return self._likelihood.fit(self.cells.design(starts, drift))
-
     def _scored(self, starts: Sequence[int], drift: bool) -> Found:
+        fit = self._likelihood.fit(self.cells.design(starts, drift))
         penalty = TUNING.jump_penalty * len(starts) + TUNING.drift_penalty * drift
-        return Found(tuple(starts), drift, self._fit(starts, drift).evidence - penalty)
+        return Found(tuple(starts), drift, fit.evidence - penalty)
 
     def _proposals(self, found: Found) -> list[tuple[int, ...]]:
         """Return what is there with the step that tells most, and with the two that do."""
@@ -109,10 +107,11 @@ class _Search:
         """Tell whether the level after a jump stays changed, rather than being a kick that fades."""
         others = [each for each in found.starts if each != start]
         after = (self.cells.centres - start) / self.cells.width
-        fit = self._fit(others, found.drift)
+        design = self.cells.design(others, found.drift)
+        fit = self._likelihood.fit(design)
         at = int(np.unravel_index(int(fit.log_evidence.argmax()), fit.log_evidence.shape)[0])
         fading = np.where(after >= 0, correlations_at(np.maximum(after, 0))[at], 0.0)
-        kicked = self._likelihood.fit(np.column_stack([self.cells.design(others, found.drift), fading]))
+        kicked = self._likelihood.fit(np.column_stack([design, fading]))
         return found.score >= kicked.evidence - TUNING.jump_penalty * len(found.starts) - (
             TUNING.drift_penalty * found.drift
         )

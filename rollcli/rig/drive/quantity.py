@@ -101,16 +101,11 @@ class SequenceAssessment:
         """Whether there are frames enough to look for jumps and a drift."""
         return self.used >= TUNING.searched
 
-    @property
-    def starts(self) -> list[int]:
-        """The first frame of each segment but the first."""
-        return [each.frame for each in self.jumps]
-
     def means(self, starts: Sequence[int]) -> list[Estimate]:
         """Return the mean of each stretch between such frames."""
         if not self.used:
             return [Estimate()] * (len(starts) + 1)
-        edges = sorted({*starts, *self.starts})
+        edges = sorted({*starts, *(each.frame for each in self.jumps)})
         likelihood = Likelihood(make_cells(self.series, edges), self.unit)
         fitted = _Fitted(self.series, likelihood, edges, self.drifts)
         return [fitted.mean_over(first, end) for first, end in bounds_of(starts, self.frames)]

@@ -113,11 +113,6 @@ def _camera(file: File, values: Mapping[str, str], key: str) -> tuple[float, flo
     return found[0], found[4], found[2], found[5]
 
 
-def is_cityscapes(file: File) -> bool:
-    """Tell whether a file is a calibration of Cityscapes."""
-    return '"intrinsic"' in file.text and '"u0"' in file.text
-
-
 def read_cityscapes(file: File) -> Fields:
     """Read the camera and the baseline."""
     values = file.json()

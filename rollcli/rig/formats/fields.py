@@ -166,3 +166,8 @@ class File(NamedTuple):
 def has_key(sign: str, *keys: str) -> Callable[[File], bool]:
     """Return what tells whether a line of a file gives one of these keys a value."""
     return lambda file: any(key in keys for key, _ in file.lines(sign))
+
+
+def has_text(*marks: str) -> Callable[[File], bool]:
+    """Return what tells whether all of these are in a file."""
+    return lambda file: all(mark in file.text for mark in marks)

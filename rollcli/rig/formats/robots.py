@@ -83,11 +83,6 @@ def read_kalibr(file: File) -> Fields:
     return Fields(baseline=math.hypot(x, y, z), lacks=_RAW)
 
 
-def is_zed(file: File) -> bool:
-    """Tell whether a file is a ZED camera's SN*.conf."""
-    return any(line.lstrip().startswith("[LEFT_CAM_") for line in file.text.splitlines())
-
-
 def read_zed(file: File) -> Fields:
     """Read the baseline, which the file gives in millimetres."""
     section = ""
