@@ -270,8 +270,9 @@ def command(make: Callable[..., Any] | None = None, **attributes: Any) -> Callab
 
         text, _, examples = inspect.cleandoc(function.__doc__ or "").partition("\n\nExamples\n--------\n")
         shown = [(purpose, inspect.cleandoc(steps)) for purpose, steps in _EXAMPLE.findall(examples)]
-        words: dict[str, Any] = {"help": text, "examples": shown, **attributes}
-        return Command(function.__name__, callback=run, params=params, **words)
+        return Command(
+            function.__name__, callback=run, params=params, help=text, examples=shown, **attributes
+        )
 
     return declare
 
