@@ -69,7 +69,7 @@ class SequenceTuning:
     spread_power : float
         The prior of a spread grows with this power of it, so that few frames do not hide a slow movement:
         intervals of 20 frames with a correlation of 0.97 cover 0.01 more than with half of it.
-    error_factors : tuple of (float, float)
+    error_factors, error_priors : tuple of float
         What the frames' own variances may have to be multiplied by, and the prior probability of it. Where
         they are right, doubting them widens intervals by nothing from 20 frames on. Steps of 4 above 1 would
         cover 0.83 in place of 0.96 of 120 frames whose errors are said three times too small.
@@ -104,14 +104,8 @@ class SequenceTuning:
     spreads: tuple[float, float] = (0.01, 1.0)
     spread_steps: int = 13
     spread_power: float = 0.5
-    error_factors: tuple[tuple[float, float], ...] = (
-        (1 / 16, 0.1),
-        (1 / 4, 0.2),
-        (1, 0.4),
-        (3, 0.12),
-        (8, 0.1),
-        (16, 0.08),
-    )
+    error_factors: tuple[float, ...] = (1 / 16, 1 / 4, 1, 3, 8, 16)
+    error_priors: tuple[float, ...] = (0.1, 0.2, 0.4, 0.12, 0.1, 0.08)
     cells: int = 240
     fewest: int = 8
     shortest: int = 8
@@ -305,10 +299,9 @@ class Likelihood:
         low, high = TUNING.spreads
         largest = max(high * unit, _ROOM * float(np.std(cells.values)))
         squares = np.geomspace(low * unit, largest, TUNING.spread_steps)[:, None] ** 2
-        factors, prior = np.array(TUNING.error_factors).T
-        slow, own = (each.ravel()[:, None] for each in np.broadcast_arrays(squares, factors))
+        slow, own = (each.ravel()[:, None] for each in np.broadcast_arrays(squares, TUNING.error_factors))
         self._weights = 1 / (slow * np.maximum(values, 0)[:, None, :] + own)  # (P, G, C)
-        priors = TUNING.spread_power / 2 * np.log(squares) + np.log(prior)
+        priors = TUNING.spread_power / 2 * np.log(squares) + np.log(TUNING.error_priors)
         alone = len(TUNING.correlations)
         probable = np.full(len(correlations), TUNING.two / (len(correlations) - alone))
         probable[:alone] = (1 - TUNING.two) * (1 - TUNING.independent) / (alone - 1)

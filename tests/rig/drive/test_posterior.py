@@ -26,7 +26,7 @@ def cells():
 def covariance_of(cells, place, noise):
     """The covariance of one noise of the grid, written out."""
     spreads = np.geomspace(*TUNING.spreads, TUNING.spread_steps)
-    spread, (factor, _) = spreads[noise // FACTORS], TUNING.error_factors[noise % FACTORS]
+    spread, factor = spreads[noise // FACTORS], TUNING.error_factors[noise % FACTORS]
     distance = np.abs(cells.centres[:, None] - cells.centres)
     if place < len(TUNING.correlations):
         correlation = TUNING.correlations[place] ** distance
@@ -57,7 +57,7 @@ def test_each_noise_has_the_fit_of_statsmodels_and_the_likelihood_of_scipy(cells
     alone = len(TUNING.correlations)
     others = (1 - TUNING.two) * (1 - TUNING.independent) / (alone - 1)
     probable = {0: (1 - TUNING.two) * TUNING.independent, **dict.fromkeys(range(1, alone), others)}
-    prior = np.log(TUNING.error_factors[noise % FACTORS][1]) + TUNING.spread_power * np.log(spread)
+    prior = np.log(TUNING.error_priors[noise % FACTORS]) + TUNING.spread_power * np.log(spread)
     prior += np.log(probable.get(place, TUNING.two / (len(TUNING.slow) * len(TUNING.fast))))
     expected = left - level / 2 + prior
     constant = len(cells.values) / 2 * np.log(2 * np.pi) + np.log(cells.variances).sum() / 2
