@@ -15,7 +15,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.estimator.moments import strips
 from rollcli.estimator.road.find import Plane
 from rollcli.stereo.alignment import level, seen_from_right
 from rollcli.stereo.misalignment import Misalignment
@@ -53,7 +52,6 @@ _MOST_ABOVE = 0.6  # of the height. Of 248 pairs the road's first row was at 0.4
 # real pairs 0.2 and 0.6, but for two where cars hide the road
 _FEWEST_ON, _FEWEST_FOUND = 0.15, 0.5
 _AS_FAR = 3.0  # px: what is found there is as far off as the small map says
-_STRIP = 64  # rows worked on at a time: what they need stays in the processor's cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,28 +200,17 @@ class Levelled:
             disparity[self.blank] = 0
         return disparity
 
-    def along(self, plane: Plane, middle: int, rows: slice) -> Views:
+    def along(self, plane: Map, middle: int, rows: slice) -> Views:
         """Return some rows of both views, the right one warped so that a plane lies at a disparity `middle`.
 
-        Grey levels between pixels are those of a view twice as large, see `views.smoothed_between`; the left
-        view is as smooth.
+        `plane` has the disparities of these rows, px. Grey levels between pixels are those of a view twice as
+        large, see `views.smoothed_between`; the left view is as smooth.
         """
         left, right = self.views
-        columns = np.arange(self.shape[1], dtype=np.float32) + np.float32(middle)
-        seen = np.empty_like(left[rows])
-        for some in strips(len(seen), _STRIP):
-            near = np.maximum(_on_plane(plane, self.shape[1], rows.start, some), 0)
-            v = np.arange(rows.start + some.start, rows.start + some.stop, dtype=np.float32)[:, None]
-            u, v = seen_at(self.lies, columns - near, v, self.shape, near)
-            seen[some] = grey_along(right, u, np.broadcast_to(v, u.shape))
-        return smoothed_at_pixels(left[rows]), seen
-
-
-def _on_plane(plane: Plane, width: int, first: int, rows: slice) -> Map:
-    """Return the disparities of a plane in some rows, counted from the row `first` on."""
-    at_origin, across, down = map(np.float32, plane)
-    v = np.arange(first + rows.start, first + rows.stop, dtype=np.float32)[:, None]
-    return across * np.arange(width, dtype=np.float32) + (at_origin + down * v)
+        u = np.arange(self.shape[1], dtype=np.float32) + np.float32(middle) - plane
+        v = np.arange(self.shape[0], dtype=np.float32)[rows, None]
+        u, v = seen_at(self.lies, u, v, self.shape, plane)
+        return smoothed_at_pixels(left[rows]), grey_along(right, u, np.broadcast_to(v, u.shape))
 
 
 def _resized(plane: Plane, shape: tuple[int, ...], to: tuple[int, ...]) -> Plane:
@@ -243,30 +230,10 @@ class _Near(NamedTuple):
         Pixels; 0 where none is found.
     lies_on : ndarray of bool
         Where the small map is near the plane.
-    again : int
-        How many of these pixels are found there again.
     """
 
     disparity: Map
     lies_on: NDArray[np.bool_]
-    again: int
-
-    @staticmethod
-    def of(sixteenths: NDArray[np.int16], count: int, plane: Map, across: float, seen: Map) -> "_Near":
-        """Take a match over `count` disparities about a plane that grows by `across` along the rows, px.
-
-        `seen` is the small map, enlarged.
-        """
-        end = round(_END * count * SUBPIXELS)
-        known = (sixteenths > end) & (sixteenths < (count - 1) * SUBPIXELS - end)
-        shift = sixteenths.astype(np.float32) * np.float32(1 / SUBPIXELS)
-        # the plane is that of the pixel which the right view shows there
-        disparity = np.maximum(plane - np.float32(across) * shift, 0) + (shift - np.float32(count // 2))
-        known &= (disparity > 0) & (disparity <= np.arange(plane.shape[1], dtype=np.float32))
-        lies_on = np.abs(seen - plane) < np.float32(_NEAR * count)
-        lies_on &= seen > 0
-        again = int(np.count_nonzero(lies_on & known & (np.abs(seen - disparity) < np.float32(_AS_FAR))))
-        return _Near(disparity * known, lies_on, again)
 
 
 def _match_along(pair: Levelled, plane: Plane, coarse: Map) -> _Near | None:
@@ -276,18 +243,26 @@ def _match_along(pair: Levelled, plane: Plane, coarse: Map) -> _Near | None:
     count = NARROWEST * math.ceil(width / _WIDTH)
     if height - top <= 2 * _BLOCK or width <= count + _BLOCK:
         return None
-    sixteenths = _match_blocks(pair.along(plane, count // 2, slice(top, height)), count)[first - top :]
+    at_origin, across, down = map(np.float32, plane)
+    u = np.arange(width, dtype=np.float32)
+    straight = across * u + (at_origin + down * np.arange(top, height, dtype=np.float32)[:, None])
+    views = pair.along(np.maximum(straight, 0), count // 2, slice(top, height))
+    sixteenths, straight = _match_blocks(views, count)[first - top :], straight[first - top :]
+
+    end = round(_END * count * SUBPIXELS)
+    known = (sixteenths > end) & (sixteenths < (count - 1) * SUBPIXELS - end)
+    shift = sixteenths.astype(np.float32) * np.float32(1 / SUBPIXELS)
+    # the plane is that of the pixel which the right view shows there
+    disparity = np.maximum(straight - across * shift, 0) + (shift - np.float32(count // 2))
+    known &= (disparity > 0) & (disparity <= u)
     seen = coarse[first:]
-    parts = [
-        _Near.of(sixteenths[rows], count, _on_plane(plane, width, first, rows), plane[1], seen[rows])
-        for rows in strips(len(seen), _STRIP)
-    ]
-    disparity, lies_on, again = zip(*parts, strict=True)
-    near = _Near(np.concatenate(disparity), np.concatenate(lies_on), sum(again))
-    on = np.count_nonzero(near.lies_on)
-    if on < max(1, _FEWEST_ON * np.count_nonzero(seen)) or near.again < _FEWEST_FOUND * on:
+    lies_on = np.abs(seen - straight) < np.float32(_NEAR * count)
+    lies_on &= seen > 0
+    on = np.count_nonzero(lies_on)
+    found = np.count_nonzero(lies_on & known & (np.abs(seen - disparity) < np.float32(_AS_FAR)))
+    if on < max(1, _FEWEST_ON * np.count_nonzero(seen)) or found < _FEWEST_FOUND * on:
         return None
-    return near
+    return _Near(disparity * known, lies_on)
 
 
 def _match_blocks(views: Views, count: int) -> NDArray[np.int16]:
