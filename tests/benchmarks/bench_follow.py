@@ -44,7 +44,7 @@ def matched_pairs() -> dict[str, np.ndarray]:
     maps = {}
     for name, downscale in (("streets", 1.0), ("roads", 2.0)):
         for left, right in pair_inputs(str(SHARED / name / "left"), str(SHARED / name / "right")):
-            views = read_image(left.path), read_image(right.path)
+            views = read_image(left.location), read_image(right.location)
             match = match_pair(*views, StereoOptions(downscale=downscale))
             maps[Path(left.name).stem] = match.disparity
     return maps

@@ -350,7 +350,7 @@ def test_real_street_pairs_are_levelled_by_what_was_added(clockwise_deg, larger_
     odd = {"clockwise_deg": clockwise_deg, "larger_percent": larger_percent, "lower": lower}
     compared = 0
     for views in pair_inputs(str(STREETS / "left"), str(STREETS / "right"))[::6]:
-        left, right = (read_image(view.path) for view in views)
+        left, right = (read_image(view.location) for view in views)
         as_it_is = match_pair(left, right, StereoOptions())
         match = match_pair(left, seen_by(right, **odd), StereoOptions())
 

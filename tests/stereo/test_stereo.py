@@ -11,7 +11,7 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.request import Request
 from rollcli.estimator.road.find import road_plane
 from rollcli.files.formats import read_image
-from rollcli.files.inputs import pair_inputs
+from rollcli.files.inputs import pair_inputs, stem_of
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
 from rollcli.stereo import sgbm
@@ -220,21 +220,21 @@ def test_options_that_make_no_sense_are_refused(options):
 @needs_roads
 def test_real_road_pairs_need_and_get_a_wide_range():
     for left, right in pair_inputs(str(ROADS / "left"), str(ROADS / "right")):
-        match = match_pair(read_image(left.path), read_image(right.path), StereoOptions(downscale=4))
+        match = match_pair(read_image(left.location), read_image(right.location), StereoOptions(downscale=4))
         inside = match.disparity[:, match.num_disparities :]
 
         assert 4 * match.num_disparities > 331
         assert match.end_fraction < 0.001
         assert (inside > 0).mean() > 0.9
         roll_deg = math.degrees(estimate_roll(match.disparity, Request(road="all")).theta)
-        assert roll_deg == pytest.approx(ROLL_DEG[left.path.stem], abs=0.15)
+        assert roll_deg == pytest.approx(ROLL_DEG[stem_of(left.location)], abs=0.15)
 
 
 @pytest.mark.slow
 @needs_streets
 def test_real_street_pairs_get_a_range_that_fits():
     for left, right in pair_inputs(str(STREETS / "left"), str(STREETS / "right")):
-        match = match_pair(read_image(left.path), read_image(right.path), StereoOptions(downscale=2))
+        match = match_pair(read_image(left.location), read_image(right.location), StereoOptions(downscale=2))
 
         assert 32 <= match.num_disparities <= 112
         assert match.end_fraction < 0.03
