@@ -296,7 +296,6 @@ def _tell_idle(ctx: click.Context) -> None:
 
 _PROGRAM = "ROLLCLI_"
 _SETTINGS = ("ROLLCLI_STORE_TIMEOUT",)  # of no command
-_ALIKE = 0.85  # names of one command have their beginning in common
 
 
 def _tell_mistaken_variables(ctx: click.Context) -> None:
@@ -308,7 +307,9 @@ def _tell_mistaken_variables(ctx: click.Context) -> None:
     commands = tuple(f"{_PROGRAM}{name.upper()}_" for name in root.command.list_commands(root))
     for name in sorted({each for each in os.environ if each.startswith(_PROGRAM)}.difference(known)):
         if name.startswith(here) or not name.startswith(commands):
-            close = nearest(name, known, _ALIKE)
+            same = here if name.startswith(here) else _PROGRAM
+            rest = {each.removeprefix(same): each for each in known}
+            close = rest.get(nearest(name.removeprefix(same), rest))
             hint = f"; did you mean {close}?" if close else ""
             say(f"{name}: there is no such option of {ctx.command_path}{hint}")
 
