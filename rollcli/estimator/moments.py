@@ -120,12 +120,14 @@ def strips(height: int, rows: int) -> list[slice]:
     return [slice(top, min(top + rows, height)) for top in range(0, height, rows)]
 
 
-def require_pixels(valid: NDArray[np.bool_]) -> int:
+def require_pixels(valid: NDArray[np.bool_], where: str = "") -> int:
     """Count the valid pixels, and refuse too few of them.
 
     Parameters
     ----------
     valid : ndarray of bool, shape (H, W)
+    where : str
+        What a message says of these pixels, if they are not all that the map has.
 
     Returns
     -------
@@ -138,17 +140,15 @@ def require_pixels(valid: NDArray[np.bool_]) -> int:
     """
     count = int(np.count_nonzero(valid))
     if count == 0:
-        raise EstimationError(
-            f"no valid pixel: all are zero, negative, beyond {LARGEST:g}, not finite or masked out"
-        )
+        none = f": all are zero, negative, beyond {LARGEST:g}, not finite or masked out"
+        raise EstimationError(f"no valid pixel{where or none}")
     if count < MIN_PIXELS:
-        raise EstimationError(f"only {count} valid pixels: at least {MIN_PIXELS} are needed")
+        raise EstimationError(f"only {count} valid pixels{where}: at least {MIN_PIXELS} are needed")
     if count <= 2 * max(valid.shape):  # more cannot lie in two rows or columns
         rows, columns = (int(np.count_nonzero(valid.any(axis=axis))) for axis in (1, 0))
         if min(rows, columns) < 3:
-            raise EstimationError(
-                f"the valid pixels fill {rows} rows and {columns} columns: at least 3 of each are needed"
-            )
+            filled = f"{rows} rows and {columns} columns"
+            raise EstimationError(f"the valid pixels{where} fill {filled}: at least 3 of each are needed")
     return count
 
 

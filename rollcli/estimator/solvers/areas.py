@@ -53,6 +53,7 @@ class AreaPixels:
 # from a map (H, W), px, which of its pixels are valid and may be used, (H, W) of bool, what is asked, and
 # whether these pixels are the chosen area already
 AreaMethod = Callable[[NDArray[Any], NDArray[np.bool_], Request, bool], AreaPixels]
+_LOOKED_AT = " of road where the method looks"
 
 
 class PlaneFit(NamedTuple):
@@ -70,7 +71,7 @@ def fit_plane(disparity: NDArray[Any], pixels: AreaPixels) -> PlaneFit:
     EstimationError
         When the pixels do not determine a plane.
     """
-    require_pixels(pixels.used)
+    require_pixels(pixels.used, _LOOKED_AT)
     peak = float(disparity.max(where=pixels.used, initial=0))
     energy = Energy.of(map_moments(disparity, pixels.used), peak, parabolic=False)
     return PlaneFit(energy, Solution(exact(energy).theta, pixels.iterations, pixels.status))
@@ -214,7 +215,7 @@ def iterative(
     EstimationError
         When no area has enough valid pixels, or none looks like a road.
     """
-    require_pixels(usable)
+    require_pixels(usable, _LOOKED_AT)
     side = max(2, round(max(disparity.shape) / _TILES))
     grams = area_sums(tile_sums(disparity, usable, side), _SIZE, _STEP)
     across, grams = grams.shape[1], grams.reshape(-1, 4, 4)

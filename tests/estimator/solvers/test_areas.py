@@ -168,5 +168,5 @@ def test_an_area_without_pixels_is_refused_with_the_reason():
     disparity = flat_road(6)
     rows, columns = lower_centre_slices(*disparity.shape)
     disparity[rows, columns] = 0
-    with pytest.raises(EstimationError, match="no valid pixel"):
+    with pytest.raises(EstimationError, match="no valid pixel of road where the method looks"):
         plane_of(disparity)
