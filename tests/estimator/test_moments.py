@@ -54,6 +54,8 @@ def test_no_data_weighs_nothing_however_it_is_written(nothing):
     hole = np.random.default_rng(2).random(disparity.shape) < 0.3
     clean, holed = np.where(hole, 0, disparity), np.where(hole, nothing, disparity)
     assert_same(map_moments(holed), map_moments(clean))
+    found, same = (estimate_roll(each, road_mask=True).road_mask for each in (holed, clean))
+    np.testing.assert_array_equal(found, same)
 
 
 @pytest.mark.parametrize("dtype", ["uint8", "int16", ">u2", "float16", ">f4", "float64", "int64"])

@@ -119,7 +119,8 @@ class Surface:
         # where a wall crosses the surface it is as near as the road, but it does not rise as the road does
         off = disparity - road
         most = np.maximum(tolerance[reach:], np.abs(road[reach:] - road[:-reach]) / 2)
-        steady = np.abs(off[reach:] - off[:-reach]) < most
+        with np.errstate(invalid="ignore"):  # neither has data
+            steady = np.abs(off[reach:] - off[:-reach]) < most
         rises = np.zeros_like(on_it)
         rises[reach:] |= steady
         rises[:-reach] |= steady
