@@ -262,7 +262,7 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
     require_local(str(folder), "pairs are rendered to local disk: name a folder here, and upload it")
     dataset = Dataset(Path(folder), tuple(draw_specs(options)), _record(options))
     with writing(folder):
-        if dataset.folder.is_file():
+        if dataset.folder.exists() and not dataset.folder.is_dir():
             raise UsageError(f"{folder}: is a file, not a folder to write to")
         is_free = not dataset.folder.is_dir() or not any(dataset.folder.iterdir())
     if is_free or overwrite:
