@@ -418,14 +418,20 @@ def _cells_of(data: bytes, wanted: Sequence[str]) -> tuple[list[str], Iterator[t
 def parse_rows(data: bytes, name: str | Path) -> Iterator[Row]:
     """Parse the bytes of a result, row by row; errors call it `name`.
 
+    What is wrong behind the last row that is taken raises nothing.
+
     Raises
     ------
     InputError
         They are no result; the line is named.
     """
-    for found in _values_of(data, str(name), [field.name for field in fields(Row)]):
-        for values in zip(*found.values(), strict=True):
-            yield Row(**dict(zip(found, values, strict=True)))
+    data = as_utf8(data, str(name))
+    with about(name):
+        names, rows = _cells_of(data, [field.name for field in fields(Row)])
+        for line, *cells in rows:
+            yield Row(
+                **{column: _value(column, cell, line) for column, cell in zip(names, cells, strict=True)}
+            )
 
 
 def run_path(path: str | Path) -> str:
@@ -562,52 +568,37 @@ def read_columns(path: str, wanted: Sequence[str]) -> ResultColumns:
     files, status, methods = list[str](), array("B"), set[str]()
     numbers: dict[str, array[float]] = {}
     for part, data in pieces_of(path):
-        for found in _values_of(data, part, ["file", "status", "method", *wanted]):
-            files += found["file"]
-            status.extend(map(STATUSES.index, found["status"]))
-            methods.update(filter(None, found.get("method", ())))
-            for name in filter(found.__contains__, wanted):
-                column = numbers.setdefault(name, array("d"))
-                column.extend([math.nan if value is None else value for value in found[name]])
+        data = as_utf8(data, part)
+        with about(part):
+            names, rows = _cells_of(data, ["file", "status", "method", *wanted])
+            while chunk := list(islice(rows, _CHUNK)):
+                lines, *cells = zip(*chunk, strict=True)
+                found = {name: _values(name, each, lines) for name, each in zip(names, cells, strict=True)}
+                files += found["file"]
+                status.extend(map(STATUSES.index, found["status"]))
+                methods.update(filter(None, found.get("method", ())))
+                for name in filter(found.__contains__, wanted):
+                    column = numbers.setdefault(name, array("d"))
+                    column.extend([math.nan if value is None else value for value in found[name]])
     run = None if path == STREAM else read_run(path)
     return ResultColumns(path, files, status, numbers, frozenset(methods), run)
 
 
-def _values_of(data: bytes, path: str, wanted: Sequence[str]) -> Iterator[dict[str, list[Any]]]:
-    """Yield the values of columns by their names, of some rows at a time.
-
-    Parameters
-    ----------
-    data : bytes
-        CSV, JSON Lines or Parquet, which the first bytes tell.
-    path : str
-        What errors call it.
-    wanted : sequence of str
-        Columns; those that are not there are left out.
-
-    Raises
-    ------
-    InputError
-        They are no result; the line is named.
-    """
-    data = as_utf8(data, path)
-    with about(path):
-        names, rows = _cells_of(data, wanted)
-        while chunk := list(islice(rows, _CHUNK)):
-            lines, *columns = zip(*chunk, strict=True)
-            yield {name: _values(name, cells, lines) for name, cells in zip(names, columns, strict=True)}
+def _value(name: str, cell: Any, line: str) -> Any:
+    """Convert a cell of a column, which is a text of CSV or a value of JSON."""
+    try:
+        return READERS[name](cell)
+    except (KeyError, ValueError, TypeError, OverflowError) as error:
+        what = f"status: {', '.join(STATUSES)}" if name == "status" else f"value for {name}"
+        shown = "" if cell is None else cell
+        raise InputError(f"{line}: {shown!r:.80} is no {what}") from error
 
 
 def _values(name: str, cells: Sequence[Any], lines: Sequence[str]) -> list[Any]:
-    """Convert the cells of a column, which are texts of CSV or values of JSON."""
-    read, found = READERS[name], list[Any]()
+    """Convert the cells of a column; where one cannot be, raise the error of the first."""
+    if cells.count("") + cells.count(None) == len(cells):  # most columns of many results
+        return [_value(name, None, lines[0])] * len(cells)
     try:
-        if cells.count("") + cells.count(None) == len(cells):  # most columns of many results
-            return [read(None)] * len(cells)
-        found.extend(map(read, cells))
-    except (KeyError, ValueError, TypeError, OverflowError) as error:
-        value, line = cells[len(found)], lines[len(found)]
-        what = f"status: {', '.join(STATUSES)}" if name == "status" else f"value for {name}"
-        shown = "" if value is None else value
-        raise InputError(f"{line}: {shown!r:.80} is no {what}") from error
-    return found
+        return list(map(READERS[name], cells))
+    except (KeyError, ValueError, TypeError, OverflowError):
+        return [_value(name, cell, line) for cell, line in zip(cells, lines, strict=True)]
