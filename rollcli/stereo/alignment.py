@@ -469,6 +469,6 @@ class SmallViews:
             Pixels of the whole views.
         """
         seen = resampled(disparity, self.views[0].shape)
-        every = max(every, round(seen.size / _MEASURED_AT))
+        every *= max(1, round(seen.size / _MEASURED_AT))
         found = measure_misalignment(self._texture, seen, start.resized(1 / self.factor), rounds, every)
         return None if found is None else found.resized(self.factor)

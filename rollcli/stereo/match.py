@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError
 from rollcli.estimator.road.find import road_plane
 from rollcli.stereo.alignment import (
+    TOLERANCE,
     Approach,
     Measured,
     SmallViews,
@@ -79,6 +80,9 @@ def _share(measured: Measured | None) -> float:
 
 
 _MATCHES = 4  # until a pair counts as one that cannot be levelled
+# What is level by half of the blocks is so by all of them: most level pairs are, and take 2 to 5 % less time.
+# With 2.8 standard errors in place of 1, two of 17 noisy pairs with a yaw of 0.1 degrees passed, too
+_LEVEL_BY_HALF = TOLERANCE._replace(sure=1.0)
 _ROUNDS = 8  # of measuring; on empty roads with much noise each takes away a fifth of what is left
 # A scale that no rig in use has, in blocks that do not agree. Of 468 warped pairs 12 had both: three angles
 # of them were wrong by 0.3 degrees. Of the others two were wrong, by 0.11
@@ -333,7 +337,9 @@ def _match_levelled(
     for matched in range(_MATCHES):
         at = wanted
         disparity = match(at)
-        measured = small.closer.measure(disparity, at, _ROUNDS)
+        measured = small.closer.measure(disparity, at, _ROUNDS, 2) if at == LEVEL else None
+        if measured is None or not is_level(measured.misalignment, measured.errors, shape, _LEVEL_BY_HALF):
+            measured = small.closer.measure(disparity, at, _ROUNDS)
         if not any_scene:
             check_same_scene(small, look, measured)
         if measured is None:
