@@ -337,7 +337,7 @@ def _match_levelled(
     for matched in range(_MATCHES):
         at = wanted
         disparity = match(at)
-        measured = small.closer.measure(disparity, at, _ROUNDS, 2) if at == LEVEL else None
+        measured = small.closer.measure(disparity, at, _ROUNDS, every=2) if at == LEVEL else None
         if measured is None or not is_level(measured.misalignment, measured.errors, shape, _LEVEL_BY_HALF):
             measured = small.closer.measure(disparity, at, _ROUNDS)
         if not any_scene:
