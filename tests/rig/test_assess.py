@@ -29,6 +29,8 @@ def test_rows_of_any_kind_give_the_same_answer():
     assert answers[0] == answers[1] == answers[2]
     pandas = pytest.importorskip("pandas", reason="pandas is not here")
     assert rollcli.assess_rig(pandas.DataFrame(given)).now() == answers[0]
+    pyarrow = pytest.importorskip("pyarrow", reason="pyarrow is not here")
+    assert rollcli.assess_rig(pyarrow.table(given)).now() == answers[0]
 
 
 def test_a_single_row_is_a_frame_whatever_its_kind():

@@ -386,6 +386,7 @@ def _spread(found: SequenceAssessment) -> float:
 
 def _frames(rows: Any) -> RigFrames:
     """Columns of whatever was given."""
+    rows = rows.to_pydict() if hasattr(rows, "to_pydict") else rows  # PyArrow, as it reads Parquet
     if not (isinstance(rows, Mapping) or hasattr(rows, "columns")):
         rows = _columns(list(rows))
     if missing := [name for name in ("roll_deg", "status") if name not in rows]:
