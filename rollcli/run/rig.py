@@ -248,15 +248,14 @@ def run_rig(options: RigOptions) -> int:
         notes.append(f"the calibration tells what misaligned views do to depth; no effect here: {lacks}")
     checks = run_checks(rig, options.gates, missing, changes.get(ROLL.name))
     found = Findings(rig, checks, after, changes, health)
-    overwrite = options.running.overwrite
-    data = FORMATS[options.format](found).encode("utf-8", "surrogateescape")
-    write_output(options.output, data, overwrite=overwrite)
+    texts = [(options.output, FORMATS[options.format](found))]
     if options.correction is not None:
         rows = None if health is None else rows_of_drive(rig, options.results)
-        correction = correction_text(health, rows, options.results).encode()
+        texts.append((options.correction, correction_text(health, rows, options.results)))
         if rows is None and not options.running.quiet:
             say(f"{options.correction}: {NO_COLUMNS}")
-        write_output(options.correction, correction, overwrite=overwrite)
+    for name, text in texts:
+        write_output(name, text.encode("utf-8", "surrogateescape"), overwrite=options.running.overwrite)
     if not options.running.quiet:
         say(*notes)
         if options.format != "table" or not is_stream(options.output):
