@@ -70,7 +70,7 @@ class Request:
         The largest abs(roll) that road finding considers, and of a plane that may be road, radians.
     max_interval : float
         Half-width of the 95 % interval above which an angle is doubted, radians; so is one of which noise
-        and unevenness make more than 0.45 times that.
+        and misfit alone make more than 0.45 times that.
     slope_error : float
         Standard deviation of a slope along the rows, px per px, that all disparities may have beside the
         road's: what is left of it where the views of a pair were levelled (`StereoMatch.slope_error`).
@@ -115,7 +115,6 @@ class Request:
                 f"a largest roll of {math.degrees(self.max_roll):g} degrees: "
                 f"give more than 0, at most {MAX_ROLL_LIMIT_DEG:g}"
             )
-
         if not 0 <= self.slope_error < math.inf:
             raise UsageError(f"a slope error of {self.slope_error:g}: give 0 or more px per px")
         if self.seed < 0:

@@ -1,4 +1,4 @@
-"""The options of `estimate` and of the conversions. Import-light: the command line loads it for its help.
+"""The options of `estimate`, the conversions and `rig`. Import-light: the command line loads it for its help.
 
 What a docstring says of a field is the help of the field's option, and names values as the option takes them.
 """
@@ -217,7 +217,7 @@ class MethodOptions(NamedTuple):
         Largest |roll| that road finding considers, degrees.
     max_interval_deg : float
         An angle is suspect when the half-width of its 95 % interval is above this, or when noise and
-        unevenness alone make 0.45 of this, degrees.
+        misfit alone make 0.45 of this, degrees.
     seed : int
         Seed of road finding's samples.
     """
@@ -698,6 +698,7 @@ class RigOptions:
     calibration : CalibrationOptions
         For what a misalignment does to depth.
     gates : GateOptions
+    running : RunningOptions
     """
 
     results: tuple[str, ...]
