@@ -7,7 +7,7 @@ squares problems whose variables separate", SIAM J. Numer. Anal. 10(2), 1973. RE
 With the origin at the centroid of the pixels, a map is the sum of its best plane and a residual r that is
 orthogonal to 1, p and q. In the frame rotated by theta the plane is ``cx x + cy y``. `cy y` and the constant
 belong to the road, so the parabola in y has to explain ``e = r + cx x``. What it leaves of `e` is small near
-the minimum: no large numbers cancel, as they do in ``d'd - d'YJd``.
+the minimum: no large numbers cancel, as they do in ``d'd - d'Y (Y'Y)^-1 Y'd``.
 """
 
 import math
@@ -226,7 +226,7 @@ def _rotations() -> NDArray[np.float64]:
     rows = [("w", m) for m in _OF_WEIGHTS] + [("r", m) for m in _OF_RESIDUAL]
     tensor = np.zeros((len(rows), len(basis), len(source)))
     for row, (kind, (i, j)) in enumerate(rows):
-        for k in range(i + 1):  # k factors p out of x, l factors q out of y
+        for k in range(i + 1):  # k factors p out of x, m factors q out of y
             for m in range(j + 1):
                 sines = i - k + j - m
                 power = (k + j - m, i - k + m)

@@ -23,6 +23,7 @@ class AccuracyOptions:
     format : {"table", "csv", "json"}
         A table to read, or degrees and shares from 0 to 1 for programs. [default: by FILE's ending, else
         table]
+    running : RunningOptions
     """
 
     result: str

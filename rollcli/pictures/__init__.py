@@ -1,1 +1,1 @@
-"""What people look at: de-rotated maps, v-disparity, roads in colour."""
+"""What people look at: de-rotated maps, v-disparity, roads in colour, heights over the road."""

@@ -59,7 +59,7 @@ PRINT = Size(COLUMN, 0.62 * COLUMN, 7.0)
 
 @contextmanager
 def drawing_style(size: Size, salt: str = "") -> Iterator[None]:
-    """Draw as this program does, whatever a user has set for matplotlib; what he has set is put back."""
+    """Draw as this program does in the block, whatever a user has set for matplotlib."""
     with _SETTINGS, mpl.rc_context():
         mpl.rcdefaults()
         letters = dict.fromkeys(("font.size", "legend.fontsize", "axes.titlesize"), size.font)

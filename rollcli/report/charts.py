@@ -284,8 +284,7 @@ def _shifts_of_units(height: int, width: int) -> tuple[float, ...]:
 def chart_over_frames(rows: Sequence[Row], quantity: Quantity, rig: RigAssessment) -> Chart:
     """Return the value of each frame: a line, its interval as a band, suspect and failed frames marked.
 
-    The segments, drifts and jumps of the rig too. A line neither bridges a suspect frame
-    nor leads from one drive to another.
+    So are segments, drifts and jumps. A line neither bridges a suspect frame nor leads to another drive.
 
     Parameters
     ----------

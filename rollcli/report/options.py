@@ -33,6 +33,7 @@ class ReportOptions:
         some evenly spread.
     fetch : bool
         Read inputs from whichever server or bucket the result names; else only from the one it lies in.
+    running : RunningOptions
     """
 
     results: tuple[str, ...]

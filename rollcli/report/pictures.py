@@ -1,4 +1,4 @@
-"""The pictures of a frame: the road on its photo, its map before and after de-rotation, and v-disparity."""
+"""The pictures of a frame: the road on its photo, its map and v-disparity before and after, and heights."""
 
 import base64
 import math

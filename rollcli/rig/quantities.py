@@ -1,4 +1,4 @@
-"""What is assessed of a rig: roll, pitch and height, with their columns and units. Import-light."""
+"""What is assessed of a rig, with columns and units: roll, pitch, height, how views lie. Import-light."""
 
 import math
 from dataclasses import dataclass
@@ -13,11 +13,11 @@ class Quantity:
     name : str
         As people call it.
     column, ci_column : str
-        Of a result: the value, and the half-width of its 95 % interval.
+        Of a result: the value, and the half-width of its 95 % interval, empty where frames have none.
     unit : str
-        What follows a number: "°" or " m".
+        What follows a number, such as "°" or " m".
     suffix : str
-        What names end in: "deg" or "m".
+        What names end in, such as "deg" or "m".
     scale : float
         What of it is as much as a degree of an angle.
     period : float
@@ -37,7 +37,7 @@ ROLL = Quantity("roll", "roll_deg", "roll_ci95_deg", "°", "deg", period=180.0)
 PITCH = Quantity("pitch", "pitch_deg", "pitch_ci95_deg", "°", "deg")
 HEIGHT = Quantity("height", "height_m", "height_ci95_m", " m", "m", 0.1)
 QUANTITIES = (ROLL, PITCH, HEIGHT)
-# how the right view of a pair lies; the frames have no interval of these
+# how the right view of a pair lies
 ALIGNMENT = (
     Quantity("right_lower", "right_lower_px", "", " px", "px", 0.2),
     Quantity("right_clockwise", "right_clockwise_deg", "", "°", "deg", 0.1),

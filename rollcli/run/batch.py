@@ -95,7 +95,7 @@ class Batch:
     lines : list of bytes
         The other rows as they stand in the result.
     notes : list of bytes
-        What the frames of these were read from, where the result keeps it; see `inputs.inputs_line`.
+        What the frames of these were read from, where the result keeps it; see `result_file.inputs_line`.
     read_as : ReadAs
     told : list of FrameResult
         Those of which the user is told.

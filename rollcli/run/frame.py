@@ -116,7 +116,7 @@ class FrameResult:
     searched : tuple of int, or None
         First and last disparity searched, px; pairs only.
     inputs : bytes
-        What the frame was read from, where workers were told to note it: see `inputs.inputs_line`.
+        What the frame was read from, where workers were told to note it: see `result_file.inputs_line`.
     cause : str
         The code of its error: the same for all frames that failed for one cause.
     said : str

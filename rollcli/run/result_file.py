@@ -250,7 +250,7 @@ _LINE = re.compile(rb"([0-9a-f]{16} )([0-9a-f]{16}|-{16}) ([0-9a-f]{16}|-{16})\n
 
 
 def inputs_path(result: str) -> str:
-    """Return where it lies."""
+    """Return where FILE.inputs lies."""
     return f"{result}.inputs"
 
 

@@ -216,7 +216,7 @@ def _lines(found: Findings) -> Iterator[str]:
 
 
 def _segment_lines(rig: RigAssessment) -> Iterator[str]:
-    """Return a table of the segments, where there is more than one."""
+    """Yield a table of the segments, where there is more than one."""
     rows = [(drive, segment) for drive in rig.drives for segment in drive.quantities[ROLL.name].segments]
     if len(rows) < 2:
         return

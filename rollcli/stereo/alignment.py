@@ -55,10 +55,10 @@ class Measured:
     ----------
     misalignment : Misalignment
         Of the right view, pixels of the size measured at.
-    share : float
-        Of the blocks that the view is cut into, those that told.
     errors : Misalignment
         Standard error of each part.
+    share : float
+        Of the blocks that were looked at, those that told.
     spread : float
         Standard deviation of their vertical disparities from what is explained, outliers aside, pixels.
     rows : MeasuredRows
@@ -116,9 +116,8 @@ def measure_misalignment(
     """Measure how the right view lies against the left one.
 
     Least squares on the grey levels at matched pixels [Lucas and Kanade 1981], in small blocks: each gives a
-    horizontal shift, which takes up what is wrong in its disparity, and a vertical one. A robust fit of
-    offset, rotation, scale and twist to the vertical ones is the answer. Each round starts where the one
-    before has moved the blocks, both ways.
+    horizontal shift, which takes up what is wrong in its disparity, and a vertical one. A robust fit to the
+    vertical ones is the answer. Each round starts where the one before has moved the blocks, both ways.
 
     Parameters
     ----------

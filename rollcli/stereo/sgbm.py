@@ -54,7 +54,7 @@ _MODES = {
     "hh": cv2.STEREO_SGBM_MODE_HH,
     "3way": cv2.STEREO_SGBM_MODE_SGBM_3WAY,
 }
-# Half of what OpenCV's own samples take: on a slanted road less smoothing is less bias (tests/benchmarks)
+# Half of what OpenCV's own samples take: on a slanted road less smoothing is less bias
 _SMALL_STEP_COST, _LARGE_STEP_COST = 4, 16
 SUBPIXELS = 16  # OpenCV stores sixteenths of a pixel
 _STEP = 16  # px: widths that OpenCV takes

@@ -253,8 +253,9 @@ def road_plane(
     disparity : ndarray, shape (H, W)
         A small map, px; <= 0 is no data.
     smaller : float
-        Times, than the views. Matching errs by as many pixels in a small map, so by as many times more of
-        its disparities; as at full size, another plane was found in 26 of 896 searches of 41 real pairs.
+        How many times smaller the map is than the views. Matching errs by as many pixels in it, so by as many
+        times more of its disparities; with the tolerances of full size, another plane was found in 26 of 896
+        searches of 41 real pairs.
     usable : ndarray of bool, shape (H, W), or None
         Its pixels that may be used, where not all may.
     request : Request

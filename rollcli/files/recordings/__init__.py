@@ -1,1 +1,1 @@
-"""Bags as rigs record them: their topics, and the frames of a topic, each by its place in the file."""
+"""Bags and videos as rigs record them, and their frames."""

@@ -249,8 +249,9 @@ def assess_rig(
     rows : sequence of rows, or columns
         What `rollcli estimate` wrote: rows as mappings or as objects with attributes; or columns by name, as
         a dict of sequences or a DataFrame. Needed are `roll_deg` and `status`; used where they are there:
-        `file`, `roll_ci95_deg`, `pitch_deg`, `pitch_ci95_deg`, `height_m`, `height_ci95_m`. Degrees and
-        metres; None or NaN where there is nothing. In the order in which the frames were taken.
+        `file`, `roll_ci95_deg`, `pitch_deg`, `pitch_ci95_deg`, `height_m`, `height_ci95_m`, `width`,
+        `height` and the four columns of how a right view lay. Degrees, metres and pixels; None or NaN where
+        there is nothing. In the order in which the frames were taken.
     include_suspect : bool
         Let suspect frames count too.
     groups : str

@@ -77,6 +77,10 @@ class SequenceAssessment:
         few: too few frames for an interval, or none.
     between_sd : float or None
         Standard deviation between frames, beyond their own errors; None without frames.
+    series : Series
+        What was assessed.
+    unit : float
+        See `assess_sequence`.
     """
 
     frames: int
