@@ -70,7 +70,7 @@ def doubts_of(
     if road and surface and abs(surface.model.theta) > _AT_BOUND * request.max_roll:
         yield "the roll is at its bound, --max-roll"
     if interval and interval.noise > tuning.noise_share * request.max_interval:
-        yield f"noise and unevenness leave the angle open: ±{math.degrees(interval.noise):.2f} degrees"
+        yield f"noise and misfit leave the angle open: ±{math.degrees(interval.noise):.2f} degrees"
     if interval and interval.half_width > request.max_interval:
         yield f"the interval is wide: ±{math.degrees(interval.half_width):.2f} degrees"
 

@@ -86,7 +86,7 @@ MAPS = {
     "another plane, with another roll": (lambda: np.maximum(road(-10), road(10)), {}),
     "the road's pixels moved the roll": (twisted_road, {}),
     "the roll is at its bound": (lambda: road(20.2), {"max_roll": math.radians(20.25)}),
-    "noise and unevenness leave the angle open": (
+    "noise and misfit leave the angle open": (
         lambda: with_noise(np.where(np.abs(U - 320) < 40, road(4), 0), 0.8),
         {},
     ),
