@@ -121,8 +121,8 @@ def estimate(options: EstimateOptions) -> int:
       rollcli estimate --left left/ --right right/ -o rolls.csv
       rollcli report rolls.csv -o rolls.html
 
-    INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted
-    patterns, or - for paths on stdin; bags; with --side-by-side images and videos that hold both views.
+    INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted patterns, or - for
+    paths on stdin; bags; with --side-by-side images and videos that hold both views.
 
     A positive roll means that the rig is rolled counter-clockwise seen from behind: its right end is up.
 

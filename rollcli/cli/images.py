@@ -27,10 +27,10 @@ def _converted(options: records.ConvertOptions) -> int:
 def derotate(options: records.DerotateOptions) -> int:
     """Rotate disparity maps about their centre by their roll, so that rows of the road become constant.
 
-    INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted
-    patterns, or - for paths on stdin. A map
-    keeps its type, encoding and format. Values are interpolated between valid pixels alone, and what is no
-    data stays no data. With the matrix M of --save-matrix, what the camera K showed at K X is at M K X.
+    INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted patterns, or - for
+    paths on stdin. A map keeps its type, encoding and format. Values are interpolated between valid pixels
+    alone, and what is no data stays no data. With the matrix M of --save-matrix, what the camera K showed at
+    K X is at M K X.
 
     With --from, every map needs its row and every row with an angle its map: what has no partner is an error
     that names it, before anything is written. Suspect angles are used, and a line says how many there are;
@@ -88,12 +88,11 @@ def disparity(options: records.DisparityOptions) -> int:
 def vdisparity(options: records.VDisparityOptions) -> int:
     """Draw the v-disparity image of each map: the histogram of each row's disparities.
 
-    INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted
-    patterns, or - for paths on stdin. The
-    picture is an 8-bit PNG on a log scale; its first rows are those of the map. The map is taken as it is,
-    whereas `estimate --vdisparity` rotates it upright first. Where a road is found, its disparity along the
-    middle column is drawn as a dashed curve: on a de-rotated map the road's pixels lie on it. With a
-    calibration, the road's horizon on that column is drawn, too. --figure needs the extra:
+    INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted patterns, or - for
+    paths on stdin. The picture is an 8-bit PNG on a log scale; its first rows are those of the map. The map
+    is taken as it is, whereas `estimate --vdisparity` rotates it upright first. Where a road is found, its
+    disparity along the middle column is drawn as a dashed curve: on a de-rotated map the road's pixels lie on
+    it. With a calibration, the road's horizon on that column is drawn, too. --figure needs the extra:
     pip install "rollcli[report]".
 
     Examples
@@ -122,11 +121,10 @@ def vdisparity(options: records.VDisparityOptions) -> int:
 def heights(options: records.HeightsOptions) -> int:
     """Write how high each pixel of disparity maps lies over the road.
 
-    INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted
-    patterns, or - for paths on stdin. Heights
-    are along the road's normal, over the parabola, roll and camber that RESULT has for each map; positive:
-    above the road; NaN: no disparity. They are metres with a calibration that has a baseline, else camera
-    heights.
+    INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted patterns, or - for
+    paths on stdin. Heights are along the road's normal, over the parabola, roll and camber that RESULT has
+    for each map; positive: above the road; NaN: no disparity. They are metres with a calibration that has a
+    baseline, else camera heights.
 
     Every map needs its row and every row with an angle its map: what has no partner is an error that names
     it, before anything is written. Suspect angles are used, and a line says how many there are;

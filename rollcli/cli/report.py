@@ -32,8 +32,8 @@ def report(options: ReportOptions) -> int:
     """Make an HTML page of RESULTS, which `rollcli estimate` wrote: one, several, or the shards of one run.
 
     It shows the roll over the frames with its 95 % interval, suspect and failed frames marked; how often
-    each roll occurs; a summary; and a gallery of maps before and after de-rotation with their v-disparity
-    images. One file that opens from disk without a network.
+    each roll occurs; a summary; and a gallery of maps before and after de-rotation, with v-disparity and
+    heights over the road. One file that opens from disk without a network.
 
     Inputs are looked for under the names that RESULTS give them, from here or from their folder; remote ones
     only where their result lies on the same server or in the same bucket, or with --fetch. This command needs

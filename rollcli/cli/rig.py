@@ -56,7 +56,7 @@ def rig(options: RigOptions) -> int:
     --------
     How the rig is mounted, and whether it has moved
         rollcli rig rolls.csv
-    A gate for CI: status 4 when the rig has come loose, or when a map has no angle
+    A gate for CI: status 4 when the rig has come loose, or when too many maps have no sure angle
         rollcli rig rolls.csv --expect-roll 0 --within 0.5 --max-jump 0.3 --min-ok 0.9
     The shards of one run, in any order
         rollcli rig part1.csv part2.csv part3.csv
