@@ -41,7 +41,7 @@ experiment_options = record(
     option("--turns", TURNS),
     option("--timed", Number("N", at_least=1, whole=True)),
     option("--truth", FILE),
-    option("--figure", click.Choice(["svg", "pdf", "png"])),
+    option("--figure", Choice("svg", "pdf", "png")),
 )
 
 

@@ -1,7 +1,5 @@
 """`rollcli derotate`, `disparity`, `vdisparity` and `heights`: each frame becomes files."""
 
-import click
-
 from rollcli.cli import options as shared
 from rollcli.cli.command import command, option
 from rollcli.cli.types import DIR, FLAG, RESULT, Choice, Number
@@ -79,7 +77,7 @@ def disparity(options: records.DisparityOptions) -> int:
 @option("--bins", Number("N", at_least=1, at_most=65535, whole=True), section="Counting")
 @option("--max-disparity", Number("PX", above=0), section="Counting")
 @option("--counts", FLAG, section="Counting")
-@option("--figure", click.Choice(["svg", "pdf", "png"]), section="Counting")
+@option("--figure", Choice("svg", "pdf", "png"), section="Counting")
 @option("--from", RESULT, section="Counting")
 @shared.output_folder_option
 @shared.encoding_options
