@@ -7,6 +7,7 @@ import inspect
 import re
 import textwrap
 from collections.abc import Iterator
+from functools import cached_property
 from pathlib import Path
 
 import rollcli
@@ -41,12 +42,9 @@ def _entry(name: str, subject: object) -> Iterator[str]:
         yield f"```python\n{_call(name, subject)}\n```\n"
     yield _markdown(inspect.getdoc(subject) or "")
     for member, each in vars(subject).items() if inspect.isclass(subject) else ():
-        if not member.startswith("_") and isinstance(each, property):
-            yield f"#### {name}.{member}\n\n{_markdown(inspect.getdoc(each) or '')}"
-        elif not member.startswith("_") and inspect.isfunction(
-            inspect.unwrap(getattr(each, "__func__", each))
-        ):
-            yield f"#### {name}.{member}()\n\n{_markdown(inspect.getdoc(each) or '')}"
+        called = inspect.isfunction(inspect.unwrap(getattr(each, "__func__", each)))
+        if not member.startswith("_") and (called or isinstance(each, property | cached_property)):
+            yield f"#### {name}.{member}{'()' * called}\n\n{_markdown(inspect.getdoc(each) or '')}"
 
 
 def _call(name: str, function: object) -> str:
