@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from rollcli.estimator.moments import Singles
 from rollcli.stereo import row_fit
 from rollcli.stereo.misalignment import LEVEL, ColumnSupport, Misalignment
 from rollcli.stereo.views import (
@@ -27,7 +27,6 @@ from rollcli.stereo.views import (
     smoothed_between,
 )
 
-Floats = NDArray[np.float32]
 _KNOWN = 0.7  # share of a block that has to have a disparity
 _RIDGE = 0.2  # squared grey levels per pixel: gradients along the rows below this are noise
 _LEAST = 2.0  # the same, across the rows: a block with less says nothing
@@ -95,10 +94,10 @@ class Texture(NamedTuple):
     right view twice as large.
     """
 
-    left: Floats
-    right: Floats
-    across: Floats
-    down: Floats
+    left: Singles
+    right: Singles
+    across: Singles
+    down: Singles
 
     @staticmethod
     def of(views: Views) -> "Texture":
@@ -111,7 +110,7 @@ class Texture(NamedTuple):
 
 
 def measure_misalignment(
-    texture: Texture, disparity: Floats, start: Misalignment = LEVEL, rounds: int = 2, every: int = 1
+    texture: Texture, disparity: Singles, start: Misalignment = LEVEL, rounds: int = 2, every: int = 1
 ) -> Measured | None:
     """Measure how the right view lies against the left one.
 
@@ -177,21 +176,21 @@ class _Shares(NamedTuple):
     rows. Arrays of pixels have shape (blocks, pixels of a block).
     """
 
-    share: Floats
-    along: Floats
-    mixed: Floats
-    weight: Floats
-    x: Floats
-    y: Floats
+    share: Singles
+    along: Singles
+    mixed: Singles
+    weight: Singles
+    x: Singles
+    y: Singles
 
     @staticmethod
-    def of(across: Floats, down: Floats, seen: Floats, x: Floats, y: Floats) -> "_Shares":
+    def of(across: Singles, down: Singles, seen: Singles, x: Singles, y: Singles) -> "_Shares":
         """Work them out from the gradients and places of the pixels that are `seen` (1; others 0)."""
         count = np.maximum(seen.sum(axis=1), np.float32(1))
         across, down = across * seen, down * seen
 
-        def mean(one: Floats, other: Floats) -> Floats:
-            found: Floats = np.einsum("ij,ij->i", one, other) / count
+        def mean(one: Singles, other: Singles) -> Singles:
+            found: Singles = np.einsum("ij,ij->i", one, other) / count
             return found
 
         # covariances within a block: the views' brightness may differ from place to place
@@ -211,7 +210,7 @@ class _Shares(NamedTuple):
 class _Blocks:
     """The blocks of a pair; what does not change from round to round is computed once."""
 
-    def __init__(self, texture: Texture, disparity: Floats, every: int = 1) -> None:
+    def __init__(self, texture: Texture, disparity: Singles, every: int = 1) -> None:
         self._right, self._shape = texture.right, texture.left.shape
         row, column = (np.arange(side // BLOCK) for side in disparity.shape)
         places = (row[:, None] + 2 * column) % every == 0
@@ -271,7 +270,7 @@ class _Blocks:
         self._u += moved[:, None]
 
 
-def _gradients(view: Floats) -> tuple[Floats, Floats]:
+def _gradients(view: Singles) -> tuple[Singles, Singles]:
     """Grey levels per pixel along the rows and down the columns."""
     across, down = (
         cv2.Sobel(view, cv2.CV_32F, *order, ksize=3, scale=0.125).astype(np.float32, copy=False)
@@ -314,10 +313,10 @@ class Tolerance(NamedTuple):
 
 
 TOLERANCE = Tolerance()
-_MEASURED_AT = 120_000  # px: larger views are measured at this size, which keeps a fifth of the tolerance
+_MEASURED_AT = 120_000  # px: larger views are measured at this size: right to a fifth of the tolerance
 _WHOLE_FROM = 1.5  # times smaller: from here on a whole number, since means of whole pixels are quick
-# px, before a pair is matched again: the whole of most views. A level road of fine grain seems 0.06 % larger
-# at 120,000 and 0.02 % at its 307,000. More would take 25 bytes for each pixel of a large photo
+# px, once a pair is matched: the whole of most views. A level road of fine grain seems 0.06 % larger at
+# 120,000 and 0.02 % at its 307,000. More would take 25 bytes for each pixel of a large photo
 _CLOSER = 480_000
 _FURTHEST = 2.0  # times the last change; further away, two measurements do not tell
 _NO_CHANGE = 1e-6  # px^2

@@ -21,7 +21,7 @@ from rollcli.stereo.alignment import (
 from rollcli.stereo.misalignment import LEVEL, Misalignment
 from rollcli.stereo.options import StereoOptions
 from rollcli.stereo.sgbm import NARROWEST, match_views, usable_range
-from rollcli.stereo.views import Views, shrink_both
+from rollcli.stereo.views import Map, Views, shrink_both
 
 _RANGE_ROUNDS = 4
 # How far beyond the largest disparity is searched, times it; and the share of this that it has to lie within
@@ -49,7 +49,7 @@ class SmallMatch:
     """
 
     top: float
-    disparity: NDArray[np.float32]
+    disparity: Map
     believed: float
     measured: Measured | None = None
 
@@ -98,7 +98,7 @@ class FirstLook:
 
     range: int | None
     measured: Measured | None
-    disparity: NDArray[np.float32] | None = None
+    disparity: Map | None = None
 
 
 def look_for_range(views: Views) -> FirstLook:
@@ -243,7 +243,7 @@ def _seen(found: SmallMatch | None, factor: float, measured: Measured | None) ->
     return FirstLook(math.ceil(_MARGIN * found.top * factor) + 8, measured, found.disparity)
 
 
-def _match(pair: Views, count: float) -> NDArray[np.float32]:
+def _match(pair: Views, count: float) -> Map:
     usable = usable_range(math.ceil(count), 0, pair[0].shape[1], _OPTIONS.block_size)
     if usable < NARROWEST:
         return np.zeros(pair[0].shape, np.float32)

@@ -12,12 +12,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.estimator.moments import strips
+from rollcli.estimator.moments import Singles, strips
 from rollcli.stereo.misalignment import LEVEL, Misalignment
 from rollcli.stereo.sgbm import STEEPEST
 from rollcli.stereo.views import BLOCK, View, Views, block_means, blocks_at, sampled, seen_at
-
-Floats = NDArray[np.float32]
 
 _KNOWN = 0.7  # share of a block that has to have a disparity: else its mean is not that of its middle
 # px: how far the mean of the four blocks around may lie off; further is an edge. At half of it the noisy
@@ -45,7 +43,7 @@ _PLANE = np.stack(  # what a value in the middle, a slope across and a slope dow
 )
 
 
-def refined(disparity: Floats, views: Views, lies: Misalignment = LEVEL) -> Floats:
+def refined(disparity: Singles, views: Views, lies: Misalignment = LEVEL) -> Singles:
     """Shift each part of a map to where the grey levels agree.
 
     Parameters
@@ -93,13 +91,13 @@ class _Planes(NamedTuple):
         Whether the map tells a plane there.
     """
 
-    middle: Floats
-    across: Floats
-    down: Floats
+    middle: Singles
+    across: Singles
+    down: Singles
     told: NDArray[np.bool_]
 
     @staticmethod
-    def through(disparity: Floats, known: NDArray[np.bool_]) -> "_Planes":
+    def through(disparity: Singles, known: NDArray[np.bool_]) -> "_Planes":
         """Lay them through a map with these `known` pixels."""
         share = block_means(known.astype(np.float32))
         middle = block_means(disparity)
@@ -114,8 +112,8 @@ class _Planes(NamedTuple):
 
 
 def _found(
-    left: View, gradient: Floats, right: Floats, planes: _Planes, rows: slice, lies: Misalignment
-) -> Floats:
+    left: View, gradient: Singles, right: Singles, planes: _Planes, rows: slice, lies: Misalignment
+) -> Singles:
     """Find the shifts of the planes that are told in some rows of blocks, px."""
     told, pixels = planes.told[rows], slice(rows.start * BLOCK, rows.stop * BLOCK)
     middle, across, down = (each[rows][told] for each in (planes.middle, planes.across, planes.down))
@@ -132,7 +130,7 @@ def _found(
     weight -= weight.mean(axis=1, keepdims=True)  # one view may be brighter than the other
     weight /= (np.einsum("ij,ij->i", weight, weight) + np.float32(_RIDGE * BLOCK**2))[:, None]
     weight *= (1 - across)[:, None]  # the right view is that much less stretched than the left one
-    shift: Floats = np.zeros_like(row)
+    shift: Singles = np.zeros_like(row)
     for between in _ROUNDS if lies == LEVEL else _ROUNDS_LEVELLED:
         off = sampled(right, u, v, between) - grey
         step = np.clip(np.einsum("ij,ij->i", weight, off), -_LONGEST_STEP, _LONGEST_STEP)
@@ -141,7 +139,7 @@ def _found(
     return shift
 
 
-def _between(blocks: Floats) -> Floats:
+def _between(blocks: Singles) -> Singles:
     """Return values of blocks at every pixel, interpolated between their middles."""
     wider = np.pad(blocks, 1, mode="reflect", reflect_type="odd")
     size = wider.shape[1] * BLOCK, wider.shape[0] * BLOCK

@@ -16,9 +16,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from rollcli.estimator.moments import Floats, Singles
 from rollcli.stereo.misalignment import LEVEL, ColumnSupport, Misalignment
-
-Doubles = NDArray[np.float64]
 
 _FIT_ROUNDS = 60
 _SAME_SPREAD = 0.005  # of it: a fit that changes its spread by less keeps it from then on
@@ -125,15 +124,15 @@ class ColumnEvidence:
         How many times larger the views are of which this is asked.
     """
 
-    information: Doubles
-    told: Doubles
+    information: Floats
+    told: Floats
     offset: float
     twist: float
     twist_variance: float
     unevenness: float
-    shapes: Doubles
-    shape_variances: Doubles
-    reach: Doubles
+    shapes: Floats
+    shape_variances: Floats
+    reach: Floats
     shape: tuple[int, int]
     factor: float
 
@@ -175,11 +174,11 @@ class SeenBlocks(NamedTuple):
         Squared grey levels per pixel; what they say counts so much.
     """
 
-    x: NDArray[np.float32]
-    y: NDArray[np.float32]
-    near: NDArray[np.float32]
-    shift: NDArray[np.float32]
-    weight: NDArray[np.float32]
+    x: Singles
+    y: Singles
+    near: Singles
+    shift: Singles
+    weight: Singles
 
 
 class MeasuredRows(NamedTuple):
@@ -210,7 +209,7 @@ class RowFit(NamedTuple):
     lies: Misalignment
     errors: Misalignment
     spread: float
-    off: Doubles
+    off: Floats
 
 
 def fit_rows(seen: SeenBlocks, at: Misalignment = LEVEL, before: RowFit | None = None) -> RowFit:
@@ -352,7 +351,7 @@ def _yaw_of_twist(twist: float, error: float, yaw: float, skew: float, ratio: fl
 
 
 def _mean_over_causes(
-    information: Doubles, told: Doubles, lens: Doubles, pitches: Doubles
+    information: Floats, told: Floats, lens: Floats, pitches: Floats
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return mean and standard deviation of scale and of pitch over all choices of causes.
 
@@ -388,7 +387,7 @@ def _mean_over_causes(
     shares = np.exp(likely - likely.max(axis=(1, 2), keepdims=True))
     believed, doubted = shares / shares.sum(axis=(1, 2), keepdims=True)
 
-    def summed(values: Doubles, variance: Doubles | float) -> tuple[float, float]:
+    def summed(values: Floats, variance: Floats | float) -> tuple[float, float]:
         mean = float((believed * values).sum())
         return mean, float(np.sqrt((doubted * (np.square(values - mean) + variance)).sum()))
 
@@ -412,17 +411,17 @@ class _Frame(NamedTuple):
         return _Frame(x, y, near, (column - column.min()) * (row.max() + 1) + row)
 
     @property
-    def units(self) -> Doubles:
+    def units(self) -> Floats:
         """What values of the first six columns are divided by to be parts of a misalignment."""
         x, y = self.half_width, self.half_height
         return np.array([1, x, y, x * y, self.near, y * y])
 
-    def design(self, seen: SeenBlocks) -> Doubles:
+    def design(self, seen: SeenBlocks) -> Floats:
         """Return the columns of a misalignment: its six parts."""
         x, y = seen.x / np.float64(self.half_width), seen.y / np.float64(self.half_height)
         return np.stack([np.ones_like(x), x, y, x * y, seen.near / np.float64(self.near), y * y])
 
-    def shapes(self, design: Doubles) -> Doubles:
+    def shapes(self, design: Floats) -> Floats:
         """Return those columns, and what else rows may show: a bend of the lower half, and four shapes."""
         x, y = design[1:3]
         return np.stack([*design, np.maximum(y, 0), x * x, x * x * y, x * y * y, y**3])
@@ -431,15 +430,15 @@ class _Frame(NamedTuple):
 class _Fit(NamedTuple):
     """A weighted least-squares fit: values, inverse of the normal equations, residuals, weights, spread."""
 
-    values: Doubles
-    inverse: Doubles
-    off: Doubles
-    weight: Doubles
+    values: Floats
+    inverse: Floats
+    off: Floats
+    weight: Floats
     spread: float
 
 
 def _least_squares(
-    design: Doubles, shift: Doubles, weight: Doubles, held: Doubles | float = 0.0, to: Doubles | float = 0.0
+    design: Floats, shift: Floats, weight: Floats, held: Floats | float = 0.0, to: Floats | float = 0.0
 ) -> _Fit:
     """Fit; `held` and `to` are what is added to the normal equations, to hold values near `to / held`."""
     weighted = design * weight
@@ -452,9 +451,7 @@ def _least_squares(
     return _Fit(values, inverse, shift - values @ design, weight, 0.0)
 
 
-def _robust(
-    design: Doubles, shift: Doubles, fixed: Doubles, start: tuple[Doubles, float] | None = None
-) -> _Fit:
+def _robust(design: Floats, shift: Floats, fixed: Floats, start: tuple[Floats, float] | None = None) -> _Fit:
     """Fit in rounds, each block weighed by how far off it was in the last; `start`: before the first.
 
     Once the spread stays, it is held until the values do: it would go on to the few blocks that agree best.
@@ -471,12 +468,12 @@ def _robust(
 
 def _settled(
     fit: _Fit,
-    design: Doubles,
-    shift: Doubles,
-    fixed: Doubles,
+    design: Floats,
+    shift: Floats,
+    fixed: Floats,
     spread: float,
-    held: Doubles | float = 0.0,
-    to: Doubles | float = 0.0,
+    held: Floats | float = 0.0,
+    to: Floats | float = 0.0,
 ) -> _Fit:
     """Go on from a fit, each block weighed by how far off it was, until its values stay; `spread` is held."""
     for _ in range(_FIT_ROUNDS):
@@ -487,7 +484,7 @@ def _settled(
     return fit._replace(spread=spread)
 
 
-def _variance(design: Doubles, fit: _Fit, tile: NDArray[np.intp]) -> float:
+def _variance(design: Floats, fit: _Fit, tile: NDArray[np.intp]) -> float:
     """Return what the inverse of the normal equations is multiplied by to be a covariance of values.
 
     From well determined values: where two columns are nearly one, sums over tiles do not see the doubt.
@@ -499,14 +496,14 @@ def _variance(design: Doubles, fit: _Fit, tile: NDArray[np.intp]) -> float:
     return max(found, _EXACT)
 
 
-def _median(values: Doubles) -> float:
+def _median(values: Floats) -> float:
     """Return the median, in a fifth of the time that `numpy.median` takes for a few hundred values."""
     middle = (values.size - 1) // 2, values.size // 2
     ordered = np.partition(values, middle)
     return float(ordered[middle[0]] + ordered[middle[1]]) / 2
 
 
-def _believed(off: Doubles, spread: float) -> Doubles:
+def _believed(off: Floats, spread: float) -> Floats:
     """Return the weights of blocks by their residuals: far ones hardly count, and none is thrown away."""
-    doubt: Doubles = 1 + np.square(off / (_TUNING * spread))
+    doubt: Floats = 1 + np.square(off / (_TUNING * spread))
     return 1 / np.square(doubt)

@@ -17,7 +17,7 @@ _GRID_STEP = 4  # of the grid on which the rise is taken: the lag is smooth
 _AROUND = 9  # cells of the grid: where the rise is not known, it is that around
 
 
-def without_lag(disparity: NDArray[np.float32], mode: str) -> NDArray[np.float32]:
+def without_lag(disparity: Map, mode: str) -> NDArray[np.float32]:
     """Add to each pixel what SGBM lags behind there.
 
     Parameters
@@ -45,7 +45,7 @@ def without_lag(disparity: NDArray[np.float32], mode: str) -> NDArray[np.float32
     filled = np.where(known > 0, lags, cv2.blur(lags, (_AROUND, _AROUND)) / np.maximum(around, 1e-3))
     added = cv2.resize(filled, (width, height), interpolation=cv2.INTER_LINEAR).astype(np.float32, copy=False)
     added *= disparity > 0
-    corrected: NDArray[np.float32] = np.add(disparity, added, out=added)
+    corrected: Map = np.add(disparity, added, out=added)
     return corrected
 
 

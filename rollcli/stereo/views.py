@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
-from rollcli.estimator.moments import strips
+from rollcli.estimator.moments import Singles, strips
 from rollcli.stereo.misalignment import LEVEL, Misalignment
 
 _Number = TypeVar("_Number", np.float32, np.uint8)
@@ -18,7 +18,7 @@ View = NDArray[np.uint8]
 Views = tuple[View, View]
 """Left and right."""
 
-Map = NDArray[np.float32]
+Map = Singles
 """Disparities in pixels, shape (H, W); no data is 0."""
 
 BLOCK = 8  # px: the side of what gets one shift where the grey levels of both views are compared
@@ -238,12 +238,8 @@ def resampled(disparity: Map, shape: tuple[int, ...]) -> Map:
 
 
 def seen_at(
-    lies: Misalignment,
-    u: NDArray[np.float32],
-    v: NDArray[np.float32],
-    shape: tuple[int, ...],
-    near: NDArray[np.float32] | float = 0.0,
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    lies: Misalignment, u: Singles, v: Singles, shape: tuple[int, ...], near: Singles | float = 0.0
+) -> tuple[Singles, Singles]:
     """Return where a right view of this shape that `lies` so shows the points (u, v) of a level one, px.
 
     `near` are the points' disparities, px: a tilt moves near points further down.
@@ -256,7 +252,7 @@ def seen_at(
     return (1 + lies.scale) * x + (middle - lies.rotation * y), v + lies.down(x, y, near)
 
 
-def block_means(pixels: NDArray[np.float32]) -> NDArray[np.float32]:
+def block_means(pixels: Singles) -> Singles:
     """Return the means of the blocks that fit into an image, shape (H // BLOCK, W // BLOCK)."""
     height, width = (side // BLOCK for side in pixels.shape)
     whole = pixels[: height * BLOCK, : width * BLOCK]
@@ -294,8 +290,8 @@ def smoothed_at_pixels(view: View) -> View:
 
 
 def grey_between(
-    twice: NDArray[_Number], u: NDArray[np.float32], v: NDArray[np.float32]
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[_Number]]:
+    twice: NDArray[_Number], u: Singles, v: Singles
+) -> tuple[Singles, Singles, NDArray[_Number]]:
     """Return points (u, v) to 1/64 px, and the grey levels there of a view that is `smoothed_between`.
 
     The border repeats.
@@ -307,7 +303,7 @@ def grey_between(
 _STRIP = 64  # rows: what they need of a view twice as large stays in the processor's cache
 
 
-def grey_along(view: View, u: NDArray[np.float32], v: NDArray[np.float32]) -> View:
+def grey_along(view: View, u: Singles, v: Singles) -> View:
     """Return what `grey_between` does of the view `smoothed_between`, in rows that change little."""
     grey = np.empty(u.shape, np.uint8)
     for rows in strips(len(u), _STRIP):
@@ -323,15 +319,13 @@ _TO_WHOLE = 1.5 * 2**23  # a float32 of this size has steps of 1, and so has a s
 _HALF_UP = 2.0**-11
 
 
-def rounded(points: NDArray[np.float32], parts: int) -> NDArray[np.float32]:
+def rounded(points: Singles, parts: int) -> Singles:
     """Return coordinates rounded to parts of a pixel, a power of two of them."""
     to_parts = np.float32(_TO_WHOLE / parts)
     return points + to_parts - to_parts
 
 
-def sampled(
-    view: NDArray[_Number], u: NDArray[np.float32], v: NDArray[np.float32], between: int
-) -> NDArray[_Number]:
+def sampled(view: NDArray[_Number], u: Singles, v: Singles, between: int) -> NDArray[_Number]:
     """Return the grey levels at points (u, v) of a view, interpolated as `between`; the border repeats.
 
     OpenCV 4 rounds points to 1/32 px, and OpenCV 5 does not: angles of 41 real pairs differed by up to 0.07
@@ -340,9 +334,7 @@ def sampled(
     return _remapped(view, rounded(u, 32), rounded(v, 32), between)
 
 
-def _remapped(
-    view: NDArray[_Number], u: NDArray[np.float32], v: NDArray[np.float32], between: int
-) -> NDArray[_Number]:
+def _remapped(view: NDArray[_Number], u: Singles, v: Singles, between: int) -> NDArray[_Number]:
     """Return the grey levels at points that are rounded, see `sampled`."""
     grey = view.astype(np.float32, copy=False)
     return _as_stored(cv2.remap(grey, u, v, between, borderMode=cv2.BORDER_REPLICATE), view)
