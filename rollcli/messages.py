@@ -13,7 +13,7 @@ from rollcli.errors import raised_at
 _shows_tracebacks = False
 _ADDRESS = re.compile(r"(https?://)(?:[^\s/?#@]*@)?([^\s?#'\"]*)(?:[?#][^\s'\"]*(?<!:))?", re.IGNORECASE)
 _NAMES = "x-amz-[a-z-]+|x-goog-[a-z-]+|sig|signature|awsaccesskeyid|googleaccessid|key-pair-id|policy|token"
-_SIGNATURE = re.compile(rf"[?&](?:{_NAMES})=[^\s&'\"]*()", re.IGNORECASE)  # of a URL with a space before it
+_SIGNATURE = re.compile(rf"[?&](?:{_NAMES})=[^\s&'\"]*", re.IGNORECASE)  # in a URL, behind a space in that
 
 
 def say(*messages: str) -> None:
@@ -55,7 +55,7 @@ def counted(count: int, what: str) -> str:
 
 def without_secrets(text: str) -> str:
     """Leave out the passwords and the queries of web addresses, and signatures wherever they are."""
-    return _SIGNATURE.sub(r"\1", _ADDRESS.sub(r"\1\2", text))
+    return _SIGNATURE.sub("", _ADDRESS.sub(r"\1\2", text))
 
 
 def printable(text: str) -> str:

@@ -22,7 +22,7 @@ from rollcli.files.bounded import as_utf8
 from rollcli.files.storage import STREAM, list_names, read_bytes, read_named
 from rollcli.files.stores.locations import is_url, is_web_url, public_name, within
 from rollcli.files.stores.objects import NO_OBJECT
-from rollcli.rig.quantities import BOUNDS
+from rollcli.rig.quantities import ALIGNMENT, BOUNDS
 
 MAGIC = b"PAR1"
 _ROWS_AT_ONCE = 1000
@@ -263,8 +263,7 @@ STATUSES = ("ok", "suspect", "error")
 IMAGE_ROLL, TIMING = FURTHER = ("image_roll_deg", "elapsed_ms")
 COLUMNS = tuple(field.name for field in fields(Row) if field.name not in FURTHER)
 _MOST_SPACE = 1000  # bytes before what tells the format
-# how the right view of a pair lay against the left one
-ALIGNMENT_COLUMNS = ("right_lower_px", "right_clockwise_deg", "right_larger_percent", "right_twist_px")
+ALIGNMENT_COLUMNS = tuple(each.column for each in ALIGNMENT)
 _SPECIAL = re.compile(r'[,"\r\n]')  # what a field of CSV holds in quotes only
 # a millionth of a degree is far below any map's noise; nine digits keep alpha2, which is small, whole
 _DIGITS = {

@@ -293,10 +293,9 @@ class Causes:
         return lines
 
 
-_MEANING = {
+_MEANING = {  # of what "auto" stands for
     "px": "pixels as stored",
     "kitti": "stored / 256",
-    "cityscapes": "(stored - 1) / 256",
     "sgbm": "stored / 16",
 }
 

@@ -10,9 +10,10 @@ from rollcli.errors import UsageError, as_usage, reading
 from rollcli.files.bounded import MOST_SETTINGS, read_given
 from rollcli.files.storage import read_bytes
 from rollcli.files.stores.locations import is_url
+from rollcli.rig.quantities import ALIGNMENT
 from rollcli.stereo.misalignment import ColumnSupport, Misalignment
 
-_VALUES = ("right_lower_px", "right_clockwise_deg", "right_larger_percent", "right_twist_px")
+_VALUES = [each.column for each in ALIGNMENT]
 _BEND = "right_bend_px"  # in the first and the last row; files of before it came have none
 _OFFSET_CI95 = "right_lower_ci95_px"
 _COLUMNS = ("scale", "twist", "pitch", "slope_error", "pitch_error")  # as of a `ColumnSupport`
