@@ -150,7 +150,7 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
     bands, in_bands = _by_group(rows, along, None, tuning.groups)
     columns, in_columns = _by_group(rows, across, leverage, tuning.groups)
     quarter = in_bands * (2 * tuning.groups) + in_columns
-    uneven = _unevenness(heights, leverage, quarter, tuning.groups, tuning.levelled)
+    uneven = _unevenness(heights, leverage, quarter, tuning.groups, tuning.noise_falls)
     cosine, sine, grid = abs(math.cos(theta)), abs(math.sin(theta)), surface.grid
     view = 2 * (grid.centre_u * cosine + grid.centre_v * sine) / grid.scale  # how wide it is across the road
     width_at_1 = view * abs(model.alpha[1])  # in camera heights, where the disparity is 1 px

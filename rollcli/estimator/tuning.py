@@ -121,7 +121,7 @@ class IntervalTuning:
         Of the road's unevenness over the width of the view. A view that is narrow in camera heights shows
         only what is near, and the lane farther ahead differs the more. Fitted to rendered roads of ISO 8608's
         classes A to D, of which it covers 0.93 instead of 0.78; of 41 lidar sweeps 0.95 instead of 0.83.
-    levelled : float
+    noise_falls : float
         By how much noise falls from a quarter of a patch to the whole: by 4 where neighbours share none of
         it. With 4 the intervals of smooth rendered roads are half as wide again; with 2, 0.86 of the rough
         ones and 0.85 of the sweeps are covered.
@@ -140,7 +140,7 @@ class IntervalTuning:
     white: float = 0.2
     factor: float = 0.65
     uneven: float = 10.0
-    levelled: float = 2.5
+    noise_falls: float = 2.5
     twist: float = 0.0026
     bend: float = 2.75
     slant: float = 1.0

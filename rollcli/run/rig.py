@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError, UsageError
 from rollcli.files import results
 from rollcli.files.naming import listed, natural_key
-from rollcli.files.results import STATUSES, ResultColumns, parse_rows, pieces_of, read_run, run_path
 from rollcli.files.storage import STREAM, is_stream, write_output
 from rollcli.files.stores.locations import base_name, is_remote
 from rollcli.messages import say
@@ -58,8 +57,8 @@ def _assessed(paths: Sequence[str], options: RigOptions) -> tuple[RigAssessment,
     status = np.concatenate([part.status for part in parts])[order]
     frames = RigFrames(
         [joined[place] for place in order] if len(parts) > 1 else joined,
-        status == STATUSES.index("ok"),
-        status == STATUSES.index("suspect"),
+        status == results.STATUSES.index("ok"),
+        status == results.STATUSES.index("suspect"),
         {name: _joined(parts, name)[order] for name in COLUMNS if any(name in p.numbers for p in parts)},
         origins,
     )
@@ -68,11 +67,11 @@ def _assessed(paths: Sequence[str], options: RigOptions) -> tuple[RigAssessment,
     return rig, missing, [*_notes(parts), *filter(None, [missing])]
 
 
-def _joined(parts: Sequence[ResultColumns], name: str) -> NDArray[np.float64]:
+def _joined(parts: Sequence[results.ResultColumns], name: str) -> NDArray[np.float64]:
     return np.concatenate([part.numbers.get(name, np.full(len(part.files), np.nan)) for part in parts])
 
 
-Part = results.Result | ResultColumns  # one of several that are put together
+Part = results.Result | results.ResultColumns  # one of several that are put together
 
 
 def require_rows(parts: Sequence[Part], purpose: str) -> None:
@@ -109,7 +108,7 @@ def order_of(parts: Sequence[Part]) -> tuple[NDArray[np.intp], list[str]]:
     for part, shard in zip(parts, shards, strict=True):
         if shard is None:
             raise UsageError(
-                f"{part.path}: there is no {base_name(run_path(part.path))} to say which shard it is"
+                f"{part.path}: there is no {base_name(results.run_path(part.path))} to say which shard it is"
             )
     known = [shard for shard in shards if shard is not None]
     _check_shards(parts, known)
@@ -167,7 +166,7 @@ def _shard(part: Part) -> tuple[int, int] | None:
     found = re.fullmatch(r"(\d{1,9})/(\d{1,9})", str(_options(part.run).get("shard", "1/1")))
     index, count = (int(found[1]), int(found[2])) if found else (0, 0)
     if not 1 <= index <= count:
-        raise InputError(f"{run_path(part.path)}: is not the record of a run: its shard is no I/N")
+        raise InputError(f"{results.run_path(part.path)}: is not the record of a run: its shard is no I/N")
     return index, count
 
 
@@ -185,7 +184,7 @@ def _by_name(parts: Sequence[Part]) -> NDArray[np.intp]:
     return np.array(sorted(range(len(keys)), key=keys.__getitem__), dtype=np.intp)
 
 
-def _unfinished(parts: Sequence[ResultColumns]) -> str:
+def _unfinished(parts: Sequence[results.ResultColumns]) -> str:
     """Which run is not over, or was interrupted."""
     for part in parts:
         inputs = (part.run or {}).get("inputs")
@@ -195,7 +194,7 @@ def _unfinished(parts: Sequence[ResultColumns]) -> str:
     return ""
 
 
-def _notes(parts: Sequence[ResultColumns]) -> list[str]:
+def _notes(parts: Sequence[results.ResultColumns]) -> list[str]:
     encodings = [(part.run or {}).get("encoding") for part in parts]
     seen = sorted({str(name) for names in encodings if isinstance(names, list) for name in names})
     if len(seen) < 2:
@@ -266,14 +265,14 @@ def run_rig(options: RigOptions) -> int:
 
 
 def _recorded(result: str) -> FrameOptions:
-    return recorded_options(read_run(result), run_path(result))
+    return recorded_options(results.read_run(result), results.run_path(result))
 
 
 _PAIRS = 24  # matched again, a few seconds: 8 of rendered roads tell a scale to 0.02 %, one to 0.1
 _FEWEST = 4
 
 
-def rows_of_drive(rig: RigAssessment, results: Sequence[str]) -> DriveRows | None:
+def rows_of_drive(rig: RigAssessment, paths: Sequence[str]) -> DriveRows | None:
     """Match some pairs of the last drive again, and put together what their rows say.
 
     One pair of an empty road cannot tell a right view that is larger from rows that are bent; the pairs of a
@@ -285,7 +284,7 @@ def rows_of_drive(rig: RigAssessment, results: Sequence[str]) -> DriveRows | Non
         Pixels of the size matched at; None where too few of the pairs can be read here.
     """
     found: list[Measured] = []
-    for frame, options in _pairs(rig, results):
+    for frame, options in _pairs(rig, paths):
         try:
             match = read_source(frame, options).match
         except FRAME_ERRORS:  # the pairs that are left may be enough
@@ -300,7 +299,7 @@ def rows_of_drive(rig: RigAssessment, results: Sequence[str]) -> DriveRows | Non
     return DriveRows(columns, float(np.median([each.misalignment.curve for each in same])))
 
 
-def _pairs(rig: RigAssessment, results: Sequence[str]) -> Iterator[tuple[Frame, FrameOptions]]:
+def _pairs(rig: RigAssessment, paths: Sequence[str]) -> Iterator[tuple[Frame, FrameOptions]]:
     """Yield measured pairs of the rig as it is now, and how they were matched.
 
     They are spread evenly over the last drive, from the last jump on; with a drift, they are its last ones.
@@ -315,14 +314,14 @@ def _pairs(rig: RigAssessment, results: Sequence[str]) -> Iterator[tuple[Frame, 
         told = told[-_PAIRS:]
     chosen = told[np.linspace(0, len(told) - 1, min(_PAIRS, len(told))).astype(np.intp)]
     # results of several runs may have frames of one name
-    runs = list(dict.fromkeys(rig.frames.origins)) or [""] * len(results)
+    runs = list(dict.fromkeys(rig.frames.origins)) or [""] * len(paths)
     origins = rig.frames.origins or [""] * rig.count
     names = {(origins[place], rig.frames.files[place]) for place in chosen}
-    for result, run in zip(results, runs, strict=True):
-        options = _recorded(result)
+    for path, run in zip(paths, runs, strict=True):
+        options = _recorded(path)
         stereo = replace(options.stereo, align="auto", vertical_offset=None)
         options = options._replace(stereo=stereo, region=RegionOptions())
-        for name, data in pieces_of(result):
-            for row in parse_rows(data, name):
+        for name, data in results.pieces_of(path):
+            for row in results.parse_rows(data, name):
                 if (run, row.file) in names and row.right_file and not is_remote(row.file):
-                    yield frame_of_row(row, result), options
+                    yield frame_of_row(row, path), options

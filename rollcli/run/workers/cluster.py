@@ -246,7 +246,7 @@ _LOCK = threading.Lock()
 
 
 @lru_cache(maxsize=8)  # the last runs
-def _made(run: str, threads: int) -> tuple[threading.Event, ThreadPoolExecutor | None]:
+def _set_up(run: str, threads: int) -> tuple[threading.Event, ThreadPoolExecutor | None]:
     prepare_worker()
     return threading.Event(), ThreadPoolExecutor(threads) if threads > 1 else None
 
@@ -254,7 +254,7 @@ def _made(run: str, threads: int) -> tuple[threading.Event, ThreadPoolExecutor |
 def _run_here(run: str, threads: int) -> tuple[threading.Event, ThreadPoolExecutor | None]:
     """Return what stops a run on this worker, and the threads of its tasks; at first, set the worker up."""
     with _LOCK:  # or each of two threads would make its own
-        return _made(run, threads)
+        return _set_up(run, threads)
 
 
 def _stop_run(run: str, threads: int) -> None:
