@@ -372,11 +372,8 @@ def _bags(given: InputOptions) -> _Bags:
     UsageError
         Some are, or one is in a store, or --include and --exclude leave none, or the extra is missing.
     """
-    bags = []
     named = dict.fromkeys(each for name in given.inputs for each in _behind(name))
-    for name in named:
-        if files := bag_files(name):
-            bags.append((name, files))
+    bags = [(name, files) for name in named if (files := bag_files(name))]
     if bags and (len(bags) < len(named) or given.files_from is not None):
         raise UsageError(f"{bags[0][0]}: is a bag: give bags and other inputs in runs of their own")
     if bags:
