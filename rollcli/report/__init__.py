@@ -1,1 +1,1 @@
-"""A result as one HTML page."""
+"""A result as one HTML page, and its charts as files."""

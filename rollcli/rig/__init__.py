@@ -1,1 +1,1 @@
-"""What frames say about the rig: its calibration, and its pose over the road."""
+"""Calibrations, pitch and height, and what the frames of a drive say about the rig."""

@@ -74,7 +74,7 @@ class RunRecord:
         self.read_as = ReadAs()
         self.run = uuid.uuid4().hex  # tells our objects from those of another run
         self._begun = False
-        # older images, now and after a resume
+        # older images: now, and once this run is resumed
         self.replaces = options.running.overwrite or options.result.update
 
     @cached_property

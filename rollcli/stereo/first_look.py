@@ -24,10 +24,10 @@ from rollcli.stereo.sgbm import NARROWEST, match_views, usable_range
 from rollcli.stereo.views import Map, Views, shrink_both
 
 _RANGE_ROUNDS = 4
-# How far beyond the largest disparity is searched, times it; and the share of this that it has to lie within
+# Times the largest disparity that are searched; and the share of these within which it has to lie
 _BEYOND, _WITHIN = 1.4, 0.85
 _MIN_SHARE = 0.01  # of the pixels, to say anything
-# Of them, that are found with a wider range, too: 0.36 and more of real pairs, 0.24 of rendered ones with a
+# Share of the pixels that a wider range finds, too: 0.36 and more of real pairs, 0.24 of rendered ones with a
 # bare sky; 0.10 to 0.17 where another range is right
 _HARDLY_BELIEVED = 0.2
 
