@@ -353,7 +353,8 @@ def _jumps(rig: RigAssessment, drive: DriveAssessment, limit: float) -> Iterator
     if not found.jumps and not told:
         yield None, f"the jumps of {_frames(rig, drive)}: {too_few(found)}"
     elif not found.jumps:
-        yield True, f"{_frames(rig, drive)} hold no jump"
+        ends = f" {found.from_ends} frames or more from their ends" if found.searched else ""
+        yield True, f"{_frames(rig, drive)} hold no jump{ends}"
 
 
 def _limited(what: str, found: Estimate, limit: float, why: str = "too few frames") -> _Told:

@@ -62,7 +62,7 @@ class _Search:
 
     def __init__(self, likelihood: Likelihood) -> None:
         self.cells, self._likelihood = likelihood.cells, likelihood
-        self._gap = max(TUNING.shortest, TUNING.shortest_share * self.cells.frames)
+        self._gap = TUNING.apart(self.cells.frames)
 
     def jumps(self, drift: bool) -> Found:
         """Return the best jumps with a drift, or without."""

@@ -119,6 +119,10 @@ class SequenceTuning:
         """Frames that two stretches have: in fewer no jump and no drift is looked for."""
         return 2 * self.fewest
 
+    def apart(self, frames: int) -> float:
+        """Return how many frames two jumps of a drive are apart at least, and a jump and an end."""
+        return max(self.shortest, self.shortest_share * frames)
+
 
 TUNING = SequenceTuning()
 

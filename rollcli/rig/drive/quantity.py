@@ -105,6 +105,11 @@ class SequenceAssessment:
         """Whether there are frames enough to look for jumps and a drift."""
         return self.used >= TUNING.searched
 
+    @property
+    def from_ends(self) -> int:
+        """Frames before and behind a jump, without which it is not told."""
+        return math.ceil(TUNING.apart(len(self.series.values)))
+
     def means(self, starts: Sequence[int]) -> list[Estimate]:
         """Return the mean of each stretch between such frames."""
         if not self.used:
