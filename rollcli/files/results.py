@@ -444,7 +444,7 @@ def read_run(path: str | Path) -> Mapping[str, Any] | None:
     if is_web_url(record) or not (is_url(record) or os.path.lexists(record)):
         return None
     try:
-        data = read_named(record)
+        data = read_bytes(record)
         if b"\\u0000" in data:  # no option holds one
             raise ValueError("it holds a NUL character")
         run = json.loads(as_utf8(data, record))

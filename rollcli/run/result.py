@@ -17,7 +17,7 @@ from pathlib import Path
 from rollcli.errors import InputError, UsageError
 from rollcli.extras import require_extra
 from rollcli.files import results
-from rollcli.files.atomic import is_folder, is_there, remove_leftovers, sync_files
+from rollcli.files.atomic import is_file, is_folder, is_there, remove_leftovers, sync_files
 from rollcli.files.locking import exists_already, locked_folder, not_resumable
 from rollcli.files.storage import is_stream, list_names, open_stream, read_bytes, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url, located, public_name
@@ -313,8 +313,8 @@ def _check_permitted(plan: Plan) -> None:
     if has_rows(name):
         if not plan.options.result.resume:
             raise exists_already(name)
-        if not is_there(inputs_path(name)):
-            raise not_resumable(name, f"there is no {base_name(inputs_path(name))}")
+        if not is_file(inputs_path(name)):
+            raise not_resumable(name, f"there is no file {base_name(inputs_path(name))}")
         return
     for path, is_ours in ((inputs_path(name), is_inputs), (results.run_path(name), is_replaceable_record)):
         if not is_ours(path):

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rollcli.errors import InputError, OutputError, RollcliError, UsageError, output_error, writing
-from rollcli.files.atomic import atomic_file, look_at, write_atomic
+from rollcli.files.atomic import atomic_file, is_file, look_at, write_atomic
 from rollcli.files.locking import locked, take_lock
 from rollcli.files.results import FURTHER, Format, format_header, part_name
 from rollcli.files.storage import Note, noting, read_frame, state_of
@@ -191,11 +191,11 @@ def has_rows(name: str) -> bool:
 
 def data_of(path: str, most: int = -1) -> bytes:
     """Read a file of a result, or its beginning; empty where there is none."""
-    try:
-        with Path(path).open("rb") as file:
-            return file.read(most)
-    except OSError:  # it does not exist, or opening it for writing will say what is wrong
-        return b""
+    with contextlib.suppress(OSError):  # opening it for writing will say what is wrong
+        if is_file(path):  # a pipe would wait for its writer
+            with Path(path).open("rb") as file:
+                return file.read(most)
+    return b""
 
 
 def kept_rows(data: bytes, name: str, form: Format) -> bytes:

@@ -202,3 +202,13 @@ def test_fail_fast_stops_at_the_first_failure_and_can_be_resumed(undisturbed, fo
     assert (done.status, len(rows)) == (3, 9)
     rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder)
     assert results(folder) == results(undisturbed)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+@pytest.mark.parametrize("kind", ["inputs", "run.json"])
+def test_a_pipe_beside_a_result_is_not_waited_for(tmp_path, kind):
+    pipe = estimated(tmp_path, 1) / f"rolls.csv.{kind}"
+    pipe.unlink()
+    os.mkfifo(pipe)
+    done = rollcli("estimate", "maps", "-o", "rolls.csv", "-q", "--resume", "-j2", cwd=tmp_path)
+    assert f"rolls.csv.{kind}" in done.refused()
