@@ -396,7 +396,7 @@ def _kept_parts(plan: Plan, parts: list[str]) -> tuple[KeptRows, dict[str, bytes
             found, first = tuple(results.parse_rows(data, name)), rows * numbered[base_name(name)]
             if len(found) < rows and first + len(found) != len(plan.frames):
                 continue
-            kept.skip_to(first)
+            kept.skip_to(min(first, len(plan.frames)))  # its number may be a date
             _, path = part_paths(plan.output, plan.format, numbered[base_name(name)])
             inputs = read_bytes(path)
             lines = Inputs(inputs)
