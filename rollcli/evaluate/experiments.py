@@ -271,7 +271,10 @@ class Textbook:
 
     def _alpha(self, Y: Floats) -> Floats:
         """Return J d = (Y'Y)^-1 Y'd [GD eq. 7]."""
-        return np.asarray(np.linalg.solve(Y.T @ Y, Y.T @ self.d), np.float64)
+        try:
+            return np.asarray(np.linalg.solve(Y.T @ Y, Y.T @ self.d), np.float64)
+        except np.linalg.LinAlgError:  # pixels of two rows determine no parabola
+            return np.asarray(np.linalg.lstsq(Y, self.d, rcond=None)[0], np.float64)
 
 
 FORMS = ("moments", "with_pass", "textbook")

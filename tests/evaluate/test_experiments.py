@@ -87,3 +87,8 @@ def test_runs_that_stopped_short_are_left_out_of_the_mean_and_counted(found):
 def test_a_time_is_that_of_the_fastest_run():
     pauses = iter([0.2, 0.0, 0.2])
     assert _best(lambda: time.sleep(next(pauses)), 3) < 0.1
+
+
+def test_solvers_are_timed_on_pixels_of_two_rows_which_determine_no_parabola():
+    two_rows = np.array([[20.0, 20.3], [20.4, 20.6]])
+    assert examine("a", two_rows, [0.0]).pixels == time_solvers(two_rows).pixels == 4
