@@ -9,7 +9,7 @@ from rollcli.extras import require_extra
 from rollcli.files.naming import listed, natural_key
 from rollcli.files.results import Result, Row, read_result, run_path
 from rollcli.files.storage import is_stream, write_output
-from rollcli.messages import counted
+from rollcli.messages import counted, say
 from rollcli.report.charts import all_charts
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import Chart
@@ -20,7 +20,7 @@ from rollcli.run.options import EncodingOptions
 from rollcli.run.outputs import check_named_once, listed_only
 from rollcli.run.progress import Progress
 from rollcli.run.resume import recorded_calibrations, recorded_options
-from rollcli.run.rig import order_of, require_rows
+from rollcli.run.rig import order_of, require_rows, unfinished
 from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import stop_on_signals
 from rollcli.run.workers.tasks import run_tasks
@@ -79,6 +79,8 @@ def run_report(options: ReportOptions) -> ExitStatus:
     writes = [*(path for name in charts for path in options.chart_paths(name).values()), *page]
     if listed_only([*options.results, *reads], writes, options.running):
         return ExitStatus.DONE
+    if (missing := unfinished(parts)) and not options.running.quiet:
+        say(missing)
     return _write(options, result, chosen, found, rig, charts)
 
 

@@ -37,7 +37,7 @@ def _assessed(paths: Sequence[str], options: RigOptions) -> tuple[RigAssessment,
     Returns
     -------
     RigAssessment, str, list of str
-        The rig; why frames of the run are not there, empty when all are; and lines for stderr.
+        The rig; why frames of the run are not there, empty when all are; and further lines for stderr.
 
     Raises
     ------
@@ -63,8 +63,7 @@ def _assessed(paths: Sequence[str], options: RigOptions) -> tuple[RigAssessment,
         origins,
     )
     rig = assess_frames(frames, include_suspect=options.include_suspect, groups=options.groups)
-    missing = _unfinished(parts)
-    return rig, missing, [*_notes(parts), *filter(None, [missing])]
+    return rig, unfinished(parts), _notes(parts)
 
 
 def _joined(parts: Sequence[results.ResultColumns], name: str) -> NDArray[np.float64]:
@@ -184,8 +183,8 @@ def _by_name(parts: Sequence[Part]) -> NDArray[np.intp]:
     return np.array(sorted(range(len(keys)), key=keys.__getitem__), dtype=np.intp)
 
 
-def _unfinished(parts: Sequence[results.ResultColumns]) -> str:
-    """Which run is not over, or was interrupted."""
+def unfinished(parts: Sequence[Part]) -> str:
+    """Say which run is not over, or was interrupted; empty where none is known to be."""
     for part in parts:
         inputs = (part.run or {}).get("inputs")
         frames = inputs.get("frames") if isinstance(inputs, Mapping) else None
@@ -246,6 +245,8 @@ def run_rig(options: RigOptions) -> int:
         lacks = "no pair was measured" if health is None else "it has no baseline"
         notes.append(f"the calibration tells what misaligned views do to depth; no effect here: {lacks}")
     checks = run_checks(rig, options.gates, missing, changes.get(ROLL.name))
+    if not checks and missing:
+        notes.append(missing)
     found = Findings(rig, checks, after, changes, health)
     texts = [(options.output, FORMATS[options.format](found))]
     if options.correction is not None:
