@@ -105,9 +105,9 @@ def _known(line: Mapping[str, str | None], where: str) -> KnownPose:
 
 
 def _number(line: Mapping[str, str | None], name: str, where: str) -> float:
-    text = line[name]
+    text = line[name] or ""  # None where the line is short
     try:
-        number = float(text or "")
+        number = float("" if "_" in text else text)  # `1_0` is Python's notation
     except ValueError:
         number = math.nan
     if not math.isfinite(number):

@@ -166,6 +166,7 @@ TRUTHS = (
     "file,roll_deg\na,\n",
     "file,roll_deg\na,1\nb,x\n",
     "file,roll_deg\na,nan\n",
+    "file,roll_deg\na,1_0\n",
     "file,roll_deg\na\n",
     'file,roll_deg\n"a,1\n',
     "\x89PNG\r\n\x1a\n\x00\xff",
