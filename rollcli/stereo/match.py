@@ -28,7 +28,7 @@ from rollcli.stereo.misalignment import LEVEL, NOTHING_KNOWN, ColumnSupport, Mis
 from rollcli.stereo.options import StereoOptions as StereoOptions
 from rollcli.stereo.refinement import refined
 from rollcli.stereo.sgbm import NARROWEST, usable_range
-from rollcli.stereo.views import Map, as_bright, as_sharp, prepare_views, shows_nothing, shrink
+from rollcli.stereo.views import Map, as_bright, as_clear, as_sharp, prepare_views, shows_nothing, shrink
 
 # Shares of the textured blocks that tell
 _SURE = 0.3  # from here on the images are what they should be
@@ -255,7 +255,7 @@ def match_pair(
     InputError, UsageError
         See `compute_disparity`.
     """
-    given = as_sharp(as_bright(prepare_views(left, right)))
+    given = as_sharp(as_clear(as_bright(prepare_views(left, right))))
     views = shrink(given[0], options.downscale), shrink(given[1], options.downscale)
     (height, width), first = views[0].shape[:2], options.min_disparity
     if usable_range(1, first, width, options.block_size) < NARROWEST:

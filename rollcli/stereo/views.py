@@ -72,9 +72,7 @@ def as_bright(views: Views) -> Views:
     Those that are black or white in one of the views tell nothing: they may have been clipped. Nor does the
     border of either view, which the other may not have.
     """
-    few = [each[::_EVERY, ::_EVERY] for each in views]
-    shown = ~(_empty(few[0], views[0]) | _empty(few[1], views[1]))
-    levels = [np.sort(each[shown], kind="stable") for each in few]  # a radix sort, in a fifth of the time
+    levels = _levels(views)
     if not levels[0].size:
         return views
     places = (_QUANTILES * levels[0].size).astype(np.intp)
@@ -88,6 +86,13 @@ def as_bright(views: Views) -> Views:
     return _brighter(left[told], right[told])[views[0]], views[1]
 
 
+def _levels(views: Views) -> list[View]:
+    """Return grey levels of each view, ascending, where neither is empty."""
+    few = [each[::_EVERY, ::_EVERY] for each in views]
+    shown = ~(_empty(few[0], views[0]) | _empty(few[1], views[1]))
+    return [np.sort(each[shown], kind="stable") for each in few]  # a radix sort, in a fifth of the time
+
+
 def _brighter(dark: NDArray[np.float64], bright: NDArray[np.float64]) -> View:
     """Return what each grey level becomes, from quantiles of both views: straight between them.
 
@@ -99,6 +104,36 @@ def _brighter(dark: NDArray[np.float64], bright: NDArray[np.float64]) -> View:
     curve = np.interp(np.arange(256), np.append(0, at), np.append(0, to))
     levels: View = np.minimum(np.rint(curve), 255).astype(np.uint8)
     return levels
+
+
+_OUTSIDE = 0.01  # share of the pixels that may be darker, and brighter: lamps are
+# grey levels, from the first of the others to the last, from which on views stay as they are: all of 79 real
+# pairs have 211 and more, rendered ones 140
+_CLEAR = 128
+_SPREAD = 16, 240  # where the first and the last come to lie; what is beyond goes on to black and to white
+# times: more spreads noise. Of the 41 pairs at an eighth of their brightness with a noise of one grey level,
+# one that is ok is off by more than 0.25 degrees; with 8 times five are
+_MOST_SPREAD = 4.0
+
+
+def as_clear(views: Views) -> Views:
+    """Spread the grey levels of views that are dark or hazy: how much is texture is told in grey levels.
+
+    Of 41 real pairs at a quarter of their brightness the mean error is -0.005 degrees in place of -0.044, and
+    0.95 are covered in place of 0.90 (tests/benchmarks/bench_lidar.py).
+    """
+    levels = np.sort(np.concatenate(_levels(views)), kind="stable")
+    if not levels.size:
+        return views
+    outside = int(_OUTSIDE * levels.size)
+    first, last = int(levels[outside]), int(levels[-1 - outside])
+    if not 0 < last - first < _CLEAR:
+        return views
+    darkest, brightest = _SPREAD
+    brightest = min(brightest, darkest + round(_MOST_SPREAD * (last - first)))
+    spread = np.interp(np.arange(256), (0, first, last, 255), (0, darkest, brightest, 255))
+    curve: View = np.rint(spread).astype(np.uint8)
+    return curve[views[0]], curve[views[1]]
 
 
 # times as much of it, from which on a view is smoothed: none of 79 real pairs differs by more than 1.22, and

@@ -86,6 +86,8 @@ CHANGES: dict[str, Callable[[Image, Image], Views]] = {
     "JPEG of quality 50": both(packed),
     "blurred by 1 px": both(blurred),
     "a quarter as bright": both(lambda view: view // 4),
+    "an eighth as bright, noise of 1": both(lambda view: noisy(view / 8, sigma=1.0)),
+    "a quarter of the contrast, hazy": both(lambda view: view // 4 + 150),
     **{
         f"right view {100 * share:+.1f} % larger": right_alone(partial(seen_by, larger_percent=100 * share))
         for share in (0.001, 0.002, 0.003, 0.005, -0.002, -0.005)

@@ -8,6 +8,7 @@ from scipy import ndimage
 from rollcli.errors import InputError
 from rollcli.stereo.views import (
     as_bright,
+    as_clear,
     as_sharp,
     matched_shape,
     prepare_views,
@@ -122,14 +123,15 @@ def test_what_is_halfway_between_two_grey_levels_is_rounded_up_in_every_column()
     np.testing.assert_array_equal(smoothed_at_pixels(view), np.floor(smooth + 0.5))
 
 
+GREY = cv2.GaussianBlur(np.random.default_rng(0).integers(0, 256, (120, 160), dtype=np.uint8), (0, 0), 1.5)
+
+
 @pytest.mark.parametrize(("left", "right"), [(1.0, 0.5), (0.4, 1.0), (0.7, 1.3)])
 def test_a_view_exposed_less_is_brightened_to_the_other_and_one_in_focus_smoothed_to_it(left, right):
-    grey = cv2.GaussianBlur(np.random.default_rng(0).integers(0, 256, (60, 80), dtype=np.uint8), (0, 0), 1.5)
-
-    one, other = as_bright(tuple(np.minimum(grey * by, 255).astype(np.uint8) for by in (left, right)))
+    one, other = as_bright(tuple(np.minimum(GREY * by, 255).astype(np.uint8) for by in (left, right)))
 
     np.testing.assert_allclose(one.astype(int), other.astype(int), atol=4)
-    one, other = as_sharp((cv2.GaussianBlur(grey, (0, 0), 2), grey))
+    one, other = as_sharp((cv2.GaussianBlur(GREY, (0, 0), 2), GREY))
     np.testing.assert_allclose(one.astype(int), other.astype(int), atol=4)
 
 
@@ -145,15 +147,20 @@ def test_a_view_exposed_less_is_brightened_to_the_other_and_one_in_focus_smoothe
 )
 @pytest.mark.parametrize("swapped", [False, True])
 def test_a_view_of_another_gamma_or_offset_gets_the_others_grey_levels(other_camera, swapped):
-    grey = cv2.GaussianBlur(
-        np.random.default_rng(0).integers(0, 256, (120, 160), dtype=np.uint8), (0, 0), 1.5
-    )
-    views = grey, np.rint(other_camera(grey)).astype(np.uint8)
+    views = GREY, np.rint(other_camera(GREY)).astype(np.uint8)
 
     one, other = as_bright(views[::-1] if swapped else views)
 
     # one in 20 is darker than the first quantile, one brighter than the last
     assert np.percentile(np.abs(one.astype(int) - other), 88) <= 4
+
+
+@pytest.mark.parametrize("haze", [1, 150])
+def test_dark_and_hazy_views_have_the_grey_levels_of_clear_ones(haze):
+    clear = (4 * (GREY.astype(int) - 128) + 128).clip(16, 240).astype(np.uint8)
+
+    np.testing.assert_allclose(np.array(as_clear((clear // 4 + haze,) * 2), int), [clear] * 2, atol=9)
+    assert all(each is clear for each in as_clear((clear, clear)))
 
 
 @pytest.mark.parametrize("level", [0, 16])
