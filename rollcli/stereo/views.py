@@ -42,18 +42,19 @@ def prepare_views(left: NDArray[Any], right: NDArray[Any]) -> Views:
     if 0 in left.shape[:2]:
         raise InputError(f"the images have no pixels: {left.shape[1]}x{left.shape[0]}")
     left, right = np.asarray(left), np.asarray(right)  # of masked arrays what lies below the mask
+    deep = [each for each in (left, right) if each.dtype.kind == "u" and each.dtype.itemsize == 2]
     # cameras leave some of 16 bits unused: a fixed shift would make their images black
-    brightest = max(_brightest(left), _brightest(right))
-    return _plain(left, brightest), _plain(right, brightest)
+    white = max(map(_brightest, deep), default=1)
+    few = [each[::_EVERY, ::_EVERY].ravel() for each in deep]
+    curve = _spread(np.concatenate(few), white, _MOST_SPREAD_OF_16) if few else None
+    return _plain(left, white, curve), _plain(right, white, curve)
 
 
 _HOT = 10_000  # pixels, of which one may be brighter than white: some of a sensor are defect
 
 
 def _brightest(image: NDArray[Any]) -> int:
-    """Return the brightest of 16 bits but for defect pixels, at least 1."""
-    if image.dtype.kind != "u" or image.dtype.itemsize != 2:  # of 8 bits, or refused
-        return 1
+    """Return the brightest level but for defect pixels, at least 1."""
     last = image.size - 1 - image.size // _HOT
     return max(1, int(np.partition(image, last, axis=None)[last]))
 
@@ -114,6 +115,7 @@ _SPREAD = 16, 240  # where the first and the last come to lie; what is beyond go
 # times: more spreads noise. Of the 41 pairs at an eighth of their brightness with a noise of one grey level,
 # one that is ok is off by more than 0.25 degrees; with 8 times five are
 _MOST_SPREAD = 4.0
+_MOST_SPREAD_OF_16 = 16.0  # which have finer steps
 
 
 def as_clear(views: Views) -> Views:
@@ -122,18 +124,26 @@ def as_clear(views: Views) -> Views:
     Of 41 real pairs at a quarter of their brightness the mean error is -0.005 degrees in place of -0.044, and
     0.95 are covered in place of 0.90 (tests/benchmarks/bench_lidar.py).
     """
-    levels = np.sort(np.concatenate(_levels(views)), kind="stable")
+    curve = _spread(np.concatenate(_levels(views)), 255, _MOST_SPREAD)
+    return views if curve is None else (curve[views[0]], curve[views[1]])
+
+
+def _spread(levels: NDArray[Any], white: int, most: float) -> View | None:
+    """Return what each level becomes of images that have these, 0 aside; None where they are clear."""
+    levels = levels[levels > 0]
     if not levels.size:
-        return views
+        return None
     outside = int(_OUTSIDE * levels.size)
-    first, last = int(levels[outside]), int(levels[-1 - outside])
-    if not 0 < last - first < _CLEAR:
-        return views
+    first, last = (int(each) for each in np.sort(levels, kind="stable")[[outside, -1 - outside]])
+    share = (last - first) / white
+    if not 0 < share < _CLEAR / 255:
+        return None
     darkest, brightest = _SPREAD
-    brightest = min(brightest, darkest + round(_MOST_SPREAD * (last - first)))
-    spread = np.interp(np.arange(256), (0, first, last, 255), (0, darkest, brightest, 255))
-    curve: View = np.rint(spread).astype(np.uint8)
-    return curve[views[0]], curve[views[1]]
+    brightest = min(brightest, darkest + round(most * 255 * share))
+    every = np.arange(np.iinfo(levels.dtype).max + 1)
+    become = np.interp(every, (0, first, last, white), (0, darkest, brightest, 255))
+    curve: View = np.rint(become).astype(np.uint8)
+    return curve
 
 
 # times as much of it, from which on a view is smoothed: none of 79 real pairs differs by more than 1.22, and
@@ -382,7 +392,7 @@ def _as_stored(grey: NDArray[Any], like: NDArray[_Number]) -> NDArray[_Number]:
     return grey.astype(like.dtype, copy=False)
 
 
-def _plain(image: NDArray[Any], brightest: int) -> View:
+def _plain(image: NDArray[Any], white: int, curve: View | None) -> View:
     image = image.astype(image.dtype.newbyteorder("="), copy=False)
     if image.dtype not in (np.uint8, np.uint16) or not (image.ndim == 2 or image.shape[2:] == (3,)):
         raise InputError(
@@ -390,6 +400,6 @@ def _plain(image: NDArray[Any], brightest: int) -> View:
             "grey and BGR images of 8 and 16 bits can"
         )
     if image.dtype == np.uint16:
-        image = cv2.convertScaleAbs(image, alpha=255 / brightest)
+        image = cv2.convertScaleAbs(image, alpha=255 / white) if curve is None else curve[image]
     grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if image.ndim == 3 else image
     return grey.astype(np.uint8, copy=False)

@@ -64,6 +64,14 @@ def noisy(view: Image, sigma: float) -> Image:
     return np.clip(np.rint(view + noise), 0, 255).astype(np.uint8)
 
 
+def with_lamps(view: Image) -> Image:
+    """Return 16 bits, proportional to the light, a tenth as bright as the lamps above the road."""
+    light: Image = np.rint(200 + 6000 * (view / 255) ** 2.2).astype(np.uint16)
+    for column in range(100, 1242, 150):
+        cv2.circle(light, (column, 80), 8, 65535, -1)
+    return light
+
+
 def packed(view: Image) -> Image:
     file = cv2.imencode(".jpg", view, [cv2.IMWRITE_JPEG_QUALITY, 50])[1]
     return np.asarray(cv2.imdecode(file, cv2.IMREAD_GRAYSCALE))
@@ -87,6 +95,7 @@ CHANGES: dict[str, Callable[[Image, Image], Views]] = {
     "blurred by 1 px": both(blurred),
     "a quarter as bright": both(lambda view: view // 4),
     "an eighth as bright, noise of 1": both(lambda view: noisy(view / 8, sigma=1.0)),
+    "16 bits, lamps ten times as bright": both(with_lamps),
     "a quarter of the contrast, hazy": both(lambda view: view // 4 + 150),
     **{
         f"right view {100 * share:+.1f} % larger": right_alone(partial(seen_by, larger_percent=100 * share))
