@@ -179,6 +179,8 @@ def encode_turned(source: Source, roll: float, given: EncodingOptions, *, expand
     values = stored.values
     if sign < 0:  # positive numbers are data to the rotation; whole ones get room for their lowest
         values = -(values if values.dtype.kind == "f" else values.astype(np.int64))
+    if "plateau" in source.warnings:  # positive numbers that are no data
+        values = np.where((source.disparity == 0) & (values > 0), 0, values)
     turned = sign * derotate(values, roll, expand=expand, invalid=no_data)
     turned = turned.astype(stored.values.dtype, copy=False)
     return encode_stored(turned, stored.format, stored.nodata, source.text)
