@@ -305,7 +305,8 @@ class _Profile:
         road = self.road
         cosine, sine, camber = math.cos(road.model.theta), math.sin(road.model.theta), road.model.camber
         doffs = 0.0 if calibration is None else calibration.doffs
-        d = stored.astype(np.float32)
+        with np.errstate(over="ignore"):  # what becomes inf is no data
+            d = stored.astype(np.float32)
         known = (d > max(0.0, -doffs)) & (d <= LARGEST)
         d[~known] = self.disparity
         rest: Singles | np.float32 = np.float32(1)

@@ -87,12 +87,12 @@ def test_far_above_a_plane_heights_are_exact_and_need_no_calibration():
     rig = Calibration(fx=400, fy=400, cx=CENTRE[0], cy=CENTRE[1], baseline=0.5)
     road, model = road_of(0.2, 30, 0.4, 0, 0)
     g = model.disparity(U - CENTRE[0], V - CENTRE[1])
-    d = np.where(g > 5, g * 2.5, 0)
+    d = np.where(g > 5, g * 2.5, np.where(CENTRE[0] < U, 0, 1e300))
     in_heights = heights_over(d, road, None)
-    assert np.allclose(in_heights[d > 0], 1 - 1 / 2.5, atol=1e-5)
+    assert np.allclose(in_heights[g > 5], 1 - 1 / 2.5, atol=1e-5)
     camera = 1 / np.linalg.norm([0.4 / 0.5, 30 / (400 * 0.5)])
-    assert np.allclose(heights_over(d, road, rig)[d > 0], camera * (1 - 1 / 2.5), atol=1e-5)
-    assert np.isnan(in_heights[d == 0]).all()
+    assert np.allclose(heights_over(d, road, rig)[g > 5], camera * (1 - 1 / 2.5), atol=1e-5)
+    assert np.isnan(in_heights[g <= 5]).all()
 
 
 def test_a_flattening_road_goes_on_straight():
