@@ -1,10 +1,10 @@
 """Stored numbers to pixels of disparity and back."""
 
 import math
+import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -116,7 +116,7 @@ def to_disparity(
 
 
 def read_disparity(
-    path: str | Path,
+    path: str | os.PathLike[str],
     *,
     encoding: str = "auto",
     scale: float | None = None,
@@ -161,7 +161,7 @@ def read_disparity(
     """
     values = () if invalid is None else (invalid,)
     require_calibration(calibration)
-    stored = read_stored(path, rgb=encoding == Encoding.FOUNDATIONSTEREO)
+    stored = read_stored(os.fspath(path), rgb=encoding == Encoding.FOUNDATIONSTEREO)
     found = to_disparity(stored, encoding=encoding, scale=scale, invalid=values, calibration=calibration)
     return found.disparity
 
