@@ -28,7 +28,7 @@ def test_rows_of_any_kind_give_the_same_answer():
     answers = [rollcli.assess_rig(each).now() for each in (given, rows, [SCHEMA(**row) for row in rows])]
     assert answers[0] == answers[1] == answers[2]
     pandas = pytest.importorskip("pandas", reason="pandas is not here")
-    assert rollcli.assess_rig(pandas.DataFrame(given)).now() == answers[0]
+    assert rollcli.assess_rig(pandas.DataFrame({**given, "pitch_deg": pandas.NA})).now() == answers[0]
     pyarrow = pytest.importorskip("pyarrow", reason="pyarrow is not here")
     assert rollcli.assess_rig(pyarrow.table(given)).now() == answers[0]
 

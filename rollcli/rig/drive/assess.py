@@ -419,8 +419,12 @@ def _columns(rows: Sequence[Any]) -> dict[str, list[Any]]:
 
 
 def _floats(values: Sequence[Any]) -> Floats:
-    """NaN for None, and for the empty cells of a CSV."""
+    """NaN for None, for the NA of pandas' own types, and for the empty cells of a CSV."""
     try:
-        return np.array([np.nan if each is None or each == "" else float(each) for each in values])
+        return np.array([np.nan if _is_blank(each) else float(each) for each in values])
     except (TypeError, ValueError) as error:
         raise UsageError(f"the rows hold what is no number: {error}") from error
+
+
+def _is_blank(value: Any) -> bool:
+    return bool(value is None or type(value).__name__ == "NAType" or value == "")
