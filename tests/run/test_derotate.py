@@ -32,8 +32,7 @@ COMBINATIONS = [
 def written(folder, form, dtype, encoding):
     """A rolled road with holes, stored as asked for; where it is, and what it became."""
     disparity = road_map(math.radians(4), height=90) / 2 + 8
-    disparity[20:30, 40:60] = 0
-    disparity[50:70, 100:150] = 3  # as OpenCV marks what has no match
+    disparity[20:30, 40:60], disparity[50:70, 100:150] = 0, 120  # no data, and what is much too large
     numbers = np.where(disparity > 0, disparity / STEPS[encoding] + (encoding == "cityscapes"), 0)
     stored = (numbers if dtype[0] == "f" else np.rint(numbers)).astype(dtype)
     ending = "tif" if form == "tiff" else form
@@ -53,8 +52,7 @@ def test_a_map_keeps_its_format_type_and_encoding(tmp_path, form, dtype, encodin
     assert (stored.format, stored.values.dtype) == (form, np.dtype(dtype))
     assert stored.values.shape == read_stored(before).values.shape
     level = read_disparity(after, encoding=encoding)
-    ends = [(each[each > 0].min(), each.max()) for each in (read_disparity(before, encoding=encoding), level)]
-    assert ends[1] == pytest.approx(ends[0], rel=0.15)
+    assert level.max() == pytest.approx(read_disparity(before, encoding=encoding).max(), rel=0.15)
     roll = estimate_roll(level, Request(road="all")).theta
     assert math.degrees(roll) == pytest.approx(0, abs=0.05 + 2 * STEPS[encoding])
 
