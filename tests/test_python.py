@@ -6,7 +6,6 @@ import importlib
 import inspect
 import json
 import math
-import os
 import re
 import sys
 import types
@@ -266,7 +265,7 @@ def test_a_photograph_is_told_as_the_command_tells_it():
 
 
 def test_threads_may_call_it_at_the_same_time():
-    maps = [rollcli.read_disparity(path) for path in os.scandir(MAP.parent)] * 3
+    maps = [rollcli.read_disparity(path) for path in sorted(MAP.parent.iterdir())] * 3
     one_by_one = [rollcli.estimate_roll(each).to_dict() for each in maps]
     with ThreadPoolExecutor(4) as pool:
         assert [each.to_dict() for each in pool.map(rollcli.estimate_roll, maps)] == one_by_one

@@ -144,7 +144,7 @@ def foundation_stereo(disparity):
 def test_numbers_in_three_channels_are_read_and_written_back(tmp_path):
     disparity = road_map()
     (tmp_path / "a.png").write_bytes(foundation_stereo(disparity))
-    found = read_disparity(tmp_path / "a.png", encoding="foundationstereo")
+    found = read_disparity(*os.scandir(tmp_path), encoding="foundationstereo")
     np.testing.assert_allclose(found, np.where(disparity > 0, disparity, 0), atol=0.00051)
     given = ["--encoding", "foundationstereo"]
     assert rollcli("estimate", "a.png", *given, cwd=tmp_path).status == 0
