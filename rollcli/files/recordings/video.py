@@ -9,6 +9,7 @@ So frames are decoded in their order, from the start, by the process that hands 
 a resumed run passes over those that are done. Only on a cluster does each worker decode for itself.
 """
 
+import contextlib
 import os
 import struct
 from collections.abc import Iterator
@@ -31,6 +32,7 @@ _EBML, _SEGMENT = 0x1A45DFA3, 0x18538067  # Matroska's
 _MOST_EDITS = 1000
 _SILENT = 0  # OpenCV's level
 # a packet that is cut off makes no frame, and what a file names elsewhere is not followed
+_OPTIONS_NAME = "OPENCV_FFMPEG_CAPTURE_OPTIONS"
 _OPTIONS = "fflags;discardcorrupt|protocol_whitelist;file"
 _PACKETS = [cv2.CAP_PROP_FORMAT, -1]  # OpenCV hands them out as they are
 _ALL_THREADS, _ONE_THREAD = ([cv2.CAP_PROP_N_THREADS, each] for each in (os.cpu_count() or 1, 1))
@@ -130,12 +132,10 @@ class _Decoder:
         with Path(self._path).open("rb") as file:
             if _container(file.read(16)) is None:
                 raise InputError(f"{self._name}: is no MP4, MOV, AVI or Matroska file")
-        os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = _OPTIONS
         os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # its errors are ours to tell
-        level = _set_log_level(_SILENT)
         path = os.path.abspath(self._path)  # noqa: PTH100
-        self._capture = cv2.VideoCapture(path, cv2.CAP_FFMPEG, self._settings)
-        _set_log_level(level)
+        with _opening():
+            self._capture = cv2.VideoCapture(path, cv2.CAP_FFMPEG, self._settings)
         self._capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)  # turned views would not be rectified any more
         self._next = 0
         if not self._capture.isOpened():
@@ -164,6 +164,20 @@ class _Decoder:
         if not found:
             raise InputError(f"{name}: cannot be decoded")
         return values
+
+
+@contextlib.contextmanager
+def _opening() -> Iterator[None]:
+    """Set how OpenCV opens a video, for a moment: a program that uses this opens its own in its own way."""
+    before, level = os.environ.get(_OPTIONS_NAME), _set_log_level(_SILENT)
+    os.environ[_OPTIONS_NAME] = _OPTIONS
+    try:
+        yield
+    finally:
+        os.environ.pop(_OPTIONS_NAME)
+        if before is not None:
+            os.environ[_OPTIONS_NAME] = before
+        _set_log_level(level)
 
 
 def _set_log_level(level: int) -> int:

@@ -293,6 +293,7 @@ def test_python_iterates_the_frames_of_a_video(tmp_path, drive):
     _, _, views = drive
     path = write_video(tmp_path / "drive.mkv", beside(views))
     found = list(package.open_recording(path, side_by_side="left-right"))
+    assert "OPENCV_FFMPEG_CAPTURE_OPTIONS" not in os.environ  # which other videos are opened by
     assert [each.name for each in found] == [f"{path}#{each:06d}" for each in range(COUNT)]
     for side, name in enumerate(("a.avi", "b.avi")):
         write_video(tmp_path / name, [each[side] for each in views], "FFV1")
