@@ -19,8 +19,10 @@ EXTRAS = {
     "tiff": ("imagecodecs",),
 }
 
-# where matplotlib's folders cannot be written it says so on stderr, as soon as it is imported
-logging.getLogger("matplotlib").setLevel(logging.ERROR)
+
+def silence_matplotlib() -> None:
+    """Let it not say on stderr, as soon as it is imported, that its folders cannot be written."""
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
 
 
 def require_extra(extra: str, what: str) -> None:
@@ -38,6 +40,8 @@ def require_extra(extra: str, what: str) -> None:
     UsageError
         Names the packages that are missing, and the command that installs them.
     """
+    if extra == "report":
+        silence_matplotlib()
     missing = [name for name in EXTRAS[extra] if not _loads(name)]
     if missing:
         raise UsageError(f"{what} needs the extra {extra}: {install_command(*missing)}")

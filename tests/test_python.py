@@ -24,7 +24,7 @@ from rollcli.run import diagnosis
 from tests import typed_client
 from tests.estimator.synthetic_maps import banked_road
 from tests.reference_page import PAGE, page
-from tests.run_cli import ROOT, ended
+from tests.run_cli import ROOT, ended, python
 from tests.run_cli import rollcli as run
 
 MAP = ROOT / "sample_data" / "maps" / "frame_0001.png"
@@ -270,6 +270,10 @@ def test_threads_may_call_it_at_the_same_time():
     with ThreadPoolExecutor(4) as pool:
         assert [each.to_dict() for each in pool.map(rollcli.estimate_roll, maps)] == one_by_one
     assert isinstance(rollcli.read_calibration(CALIB), Calibration)
+
+
+def test_a_program_that_loads_it_hears_matplotlibs_warnings_as_before():
+    python("from rollcli import *; from logging import *; exit(getLogger('matplotlib').level)", check=True)
 
 
 def test_the_page_of_reference_is_what_the_docstrings_say():

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Generic
 
 from rollcli.errors import WorkerDiedError, WorkerError
+from rollcli.extras import silence_matplotlib
 from rollcli.run.workers.chunks import Chunk, Done, Result, Task, Work, Workers
 from rollcli.run.workers.interrupt import ignore_signals, stop_signals
 
@@ -43,6 +44,7 @@ def prepare_worker() -> None:
 
     cv2.setNumThreads(1)  # tasks run in parallel, not the loops inside of one
     silence_decoders()
+    silence_matplotlib()
     _keep_freed_memory()
 
 
