@@ -12,6 +12,7 @@ import io
 import os
 import sqlite3
 import struct
+import threading
 import weakref
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
@@ -452,9 +453,9 @@ def open_bag(path: str) -> Bag:
 
 def opened(path: str) -> Bag:
     """Open a bag, or return the one that is open; see `open_bag`."""
-    return _opened(*state_of(path))
+    return _opened(*state_of(path), threading.get_ident())
 
 
-@lru_cache(maxsize=4)  # a process opens a bag once
-def _opened(path: str, size: int, modified_ns: int, process: int) -> Bag:
+@lru_cache(maxsize=16)  # a thread opens a bag once: each is at places of its own in the file
+def _opened(path: str, size: int, modified_ns: int, process: int, thread: int) -> Bag:
     return open_bag(path)

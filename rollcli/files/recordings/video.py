@@ -12,6 +12,7 @@ a resumed run passes over those that are done. Only on a cluster does each worke
 import contextlib
 import os
 import struct
+import threading
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
@@ -31,8 +32,9 @@ _BOXES = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"styp")  # that
 _EBML, _SEGMENT = 0x1A45DFA3, 0x18538067  # Matroska's
 _MOST_EDITS = 1000
 _SILENT = 0  # OpenCV's level
-# a packet that is cut off makes no frame, and what a file names elsewhere is not followed
+_SETTINGS = threading.Lock()  # OpenCV has one set of them for all threads
 _OPTIONS_NAME = "OPENCV_FFMPEG_CAPTURE_OPTIONS"
+# a packet that is cut off makes no frame, and what a file names elsewhere is not followed
 _OPTIONS = "fflags;discardcorrupt|protocol_whitelist;file"
 _PACKETS = [cv2.CAP_PROP_FORMAT, -1]  # OpenCV hands them out as they are
 _ALL_THREADS, _ONE_THREAD = ([cv2.CAP_PROP_N_THREADS, each] for each in (os.cpu_count() or 1, 1))
@@ -113,11 +115,11 @@ def read_video_frame(path: str, frame: str, name: str) -> NDArray[Any]:
         raise InputError(f"{name}: {broken_end(path) or 'is whole'}; the whole frames before are used")
     if not frame.isdecimal():
         raise InputError(f"{name}: no such frame in {path}")
-    return _decoder(*state_of(path)).read(int(frame), name)
+    return _decoder(*state_of(path), threading.get_ident()).read(int(frame), name)
 
 
-@lru_cache(maxsize=4)  # both of a pair, and those of another drive
-def _decoder(path: str, size: int, modified_ns: int, process: int) -> "_Decoder":
+@lru_cache(maxsize=8)  # both of a pair, and those of another drive; threads are at places of their own
+def _decoder(path: str, size: int, modified_ns: int, process: int, thread: int) -> "_Decoder":
     return _Decoder(path, path, _ONE_THREAD)
 
 
@@ -169,15 +171,16 @@ class _Decoder:
 @contextlib.contextmanager
 def _opening() -> Iterator[None]:
     """Set how OpenCV opens a video, for a moment: a program that uses this opens its own in its own way."""
-    before, level = os.environ.get(_OPTIONS_NAME), _set_log_level(_SILENT)
-    os.environ[_OPTIONS_NAME] = _OPTIONS
-    try:
-        yield
-    finally:
-        os.environ.pop(_OPTIONS_NAME)
-        if before is not None:
-            os.environ[_OPTIONS_NAME] = before
-        _set_log_level(level)
+    with _SETTINGS:
+        before, level = os.environ.get(_OPTIONS_NAME), _set_log_level(_SILENT)
+        os.environ[_OPTIONS_NAME] = _OPTIONS
+        try:
+            yield
+        finally:
+            os.environ.pop(_OPTIONS_NAME)
+            if before is not None:
+                os.environ[_OPTIONS_NAME] = before
+            _set_log_level(level)
 
 
 def _set_log_level(level: int) -> int:
