@@ -162,9 +162,8 @@ def test_dark_and_hazy_views_have_the_grey_levels_of_clear_ones(by, haze, kind):
     clear = (4 * (GREY.astype(int) - 128) + 128).clip(16, 240).astype(np.uint8)
     dim = (clear // 4).astype(kind) * kind(by) + kind(haze)
 
-    found = as_clear(prepare_views(dim, dim))[1].astype(int)
-
-    np.testing.assert_allclose(found[clear < 240], clear[clear < 240], atol=9)  # others may be clipped
+    # the brightest may be clipped
+    np.testing.assert_allclose(np.minimum(as_clear(prepare_views(dim, dim))[1], 240), clear, atol=9)
     assert all(each is clear for each in as_clear((clear, clear)))
 
 
