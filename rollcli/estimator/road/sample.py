@@ -133,7 +133,8 @@ def take_sample(
     Raises
     ------
     EstimationError
-        When too few pixels are valid to look for a road among them, or their disparities cannot be squared.
+        When the valid pixels are too few to look for a road among them, or lie in one row or column, or their
+        disparities cannot be squared.
     """
     disparity = np.ascontiguousarray(disparity)
     height, width = disparity.shape
@@ -197,8 +198,10 @@ def _chosen(
             break
         # finer, for the valid ones may be a grid themselves
         spacing = Spacing.of(spacing.rows * spacing.columns * max(count, LEAST_PIXELS) / tuning.pixels)
-    if count < LEAST_PIXELS:
-        raise EstimationError(f"only {count} valid pixels away from the border: too few to find a road in")
+    rows, columns = (int(np.count_nonzero(chosen.any(axis=axis))) for axis in (1, 0))
+    if count < LEAST_PIXELS or min(rows, columns) < 2:
+        found = f"{count} valid pixels away from the border, rows: {rows}, columns: {columns}"
+        raise EstimationError(f"only {found}: too few to find a road in")
     return spacing, chosen.ravel().nonzero()[0]
 
 

@@ -73,10 +73,11 @@ def test_a_sparse_map_will_do(share):
     assert angle_deg(np.where(known, street(), 0)) == pytest.approx(4, abs=0.1)
 
 
-def test_a_few_pixels_inside_are_too_few_to_look_for_a_road():
+@pytest.mark.parametrize("inside", [45, 500])
+def test_a_few_pixels_inside_or_a_single_row_are_too_few_to_look_for_a_road(inside):
     disparity, few = street(), np.zeros((480, 640), bool)
-    few[300, 100:145] = few[:2] = few[400:440, :2] = True
-    with pytest.raises(EstimationError, match="valid pixels away from the border: too few"):
+    few[300, 100 : 100 + inside] = few[:2] = few[400:440, :2] = True
+    with pytest.raises(EstimationError, match=f"only {inside} valid pixels away .* rows: 1, .* too few"):
         estimate_roll(np.where(few, disparity + 1, 0))
 
 
