@@ -84,8 +84,8 @@ def _pixels(values: NDArray[Any]) -> NDArray[np.float64]:
 
 def _counts(pixels: NDArray[np.float64], bins: int, max_disparity: float) -> NDArray[np.int32]:
     """Return the histogram of each row; the last bin also holds what lies beyond."""
-    shares = np.minimum(pixels, max_disparity) / max_disparity
-    cells = np.minimum(shares * bins, bins - 1).astype(np.int64)
+    # divided last: 15 / 22 * 22 is less than 15
+    cells = np.minimum(np.minimum(pixels, max_disparity) * bins / max_disparity, bins - 1).astype(np.int64)
     cells[pixels == 0] = bins  # one bin more, for what is no data
     cells += np.arange(len(pixels))[:, None] * (bins + 1)
     counts = np.bincount(cells.ravel(), minlength=len(pixels) * (bins + 1)).reshape(len(pixels), bins + 1)

@@ -90,6 +90,7 @@ def test_disparities_are_counted_in_the_bins_that_hold_them(monkeypatch, block):
     assert v_disparity(values).max_disparity == 71
     assert v_disparity(values).counts.shape == (23, 4 * 71)
     assert v_disparity(np.rint(values)).counts.shape == (23, 71)
+    assert (v_disparity([range(22)]).counts == [[0] + 21 * [1]]).all()  # where 15 / 22 * 22 is less than 15
 
 
 SHAPE = (97, 141)
