@@ -127,10 +127,7 @@ def endless(start, piece=b"x" * 2**20, pause_s=0.0):
 
 @pytest.mark.parametrize(
     "start",
-    [
-        b"HTTP/1.1 200 OK\r\n\r\n",
-        b"HTTP/1.1 200 OK\r\nContent-Length: 1000000\r\n\r\n",
-    ],
+    [b"HTTP/1.1 200 OK\r\n\r\n", b"HTTP/1.1 200 OK\r\nContent-Length: 1000000\r\n\r\n"],
     ids=["without length", "with length"],
 )
 def test_a_server_that_never_ends_is_left_after_the_time_for_the_whole(monkeypatch, start):

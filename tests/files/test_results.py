@@ -95,8 +95,7 @@ def bytes_of(form):
 
 
 @pytest.mark.parametrize(
-    ("form", "before"),
-    [*itertools.product(("csv", "jsonl"), (b"", b"\xef\xbb\xbf")), ("parquet", b"")],
+    ("form", "before"), [*itertools.product(("csv", "jsonl"), (b"", b"\xef\xbb\xbf")), ("parquet", b"")]
 )
 def test_columns_are_those_of_the_rows(tmp_path, form, before):
     (tmp_path / "rolls").write_bytes(before + bytes_of(form))

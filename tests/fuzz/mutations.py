@@ -6,10 +6,7 @@ from random import Random
 from tests.fuzz.corpus import repaired_png
 
 _NUMBERS = (0, 1, 127, 128, 255, 2**15 - 1, 2**16 - 1, 2**31 - 1, 2**31, 2**32 - 1, 2**63 - 1, 2**64 - 1)
-_SHORT = (
-    *(bytes([each]) for each in b"\n\r #'\"\0\xff"),
-    *b"-1 1e999 nan 999999999 \\ud800 ../".split(),
-)
+_SHORT = (*(bytes([each]) for each in b"\n\r #'\"\0\xff"), *b"-1 1e999 nan 999999999 \\ud800 ../".split())
 _LONG = (b"(" * 50, b"0" * 300, b"9" * 5000, b"[" * 5000, b"{" * 5000)
 
 

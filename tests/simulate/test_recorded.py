@@ -97,10 +97,7 @@ CASES = {
     "drawn bent": partial(_table, curvature=(0.001, 0.002), bend=(0.002, 0.005), cross_section="mixed"),
     "drawn beyond too": lambda: [
         _table(**options)
-        for options in (
-            {"height": (0.3, 0.3), "roll_deg": (-57.0, 57.0)},
-            {"principal_offset": (0.0, 400.0)},
-        )
+        for options in ({"height": (0.3, 0.3), "roll_deg": (-57.0, 57.0)}, {"principal_offset": (0.0, 400.0)})
     ],
     "possible": lambda: [
         *(_possible(principal_point=point) for point in POINTS),

@@ -71,8 +71,7 @@ def scanned_depth(spec, u, v):
 
 
 @pytest.mark.parametrize(
-    ("roughness", "section"),
-    mostly_slow(itertools.product("AE", (FLAT, CROWNED)), ("E", CROWNED)),
+    ("roughness", "section"), mostly_slow(itertools.product("AE", (FLAT, CROWNED)), ("E", CROWNED))
 )
 def test_rays_end_where_a_fine_scan_meets_the_uneven_road(roughness, section):
     spec = FrameSpec(
