@@ -110,7 +110,7 @@ def test_a_map_of_a_real_pair_gives_its_angle():
         assert_map_agrees(*pair)
 
 
-@pytest.mark.parametrize(("lower", "clockwise_deg"), [(3.0, 0.0), (0.0, 0.4), (-1.5, -0.3)])
+@pytest.mark.parametrize(("lower", "clockwise_deg"), [(3.0, 0.0), (0.0, 0.4), (-1.5, -0.3), (-0.05, 0.0)])
 def test_a_right_view_that_is_out_of_place_is_levelled_on_the_way(street, road, lower, clockwise_deg):
     moved = seen_by(street.right, clockwise_deg=clockwise_deg, lower=lower)
 
@@ -121,6 +121,7 @@ def test_a_right_view_that_is_out_of_place_is_levelled_on_the_way(street, road, 
     both = (found.disparity > 0) & (road.disparity > 0)
     assert both.sum() > 0.9 * (road.disparity > 0).sum()
     assert np.median(np.abs(found.disparity - road.disparity)[both]) < 0.1
+    assert abs(np.diff([estimate_roll(each.disparity).roll_deg for each in (found, road)])) < 0.01
 
 
 @pytest.mark.parametrize(
