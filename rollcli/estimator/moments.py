@@ -120,6 +120,12 @@ def strips(height: int, rows: int) -> list[slice]:
     return [slice(top, min(top + rows, height)) for top in range(0, height, rows)]
 
 
+def rows_and_columns(valid: NDArray[np.bool_]) -> tuple[int, int]:
+    """Return how many rows and columns of (H, W) hold a valid pixel."""
+    rows, columns = (int(np.count_nonzero(valid.any(axis=axis))) for axis in (1, 0))
+    return rows, columns
+
+
 def require_pixels(valid: NDArray[np.bool_], where: str = "") -> int:
     """Count the valid pixels, and refuse too few of them.
 
@@ -145,7 +151,7 @@ def require_pixels(valid: NDArray[np.bool_], where: str = "") -> int:
     if count < MIN_PIXELS:
         raise EstimationError(f"only {count} valid pixels{where}: at least {MIN_PIXELS} are needed")
     if count <= 2 * max(valid.shape):  # more cannot lie in two rows or columns
-        rows, columns = (int(np.count_nonzero(valid.any(axis=axis))) for axis in (1, 0))
+        rows, columns = rows_and_columns(valid)
         if min(rows, columns) < 3:
             filled = f"{rows} rows and {columns} columns"
             raise EstimationError(f"the valid pixels{where} fill {filled}: at least 3 of each are needed")

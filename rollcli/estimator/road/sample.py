@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.moments import Grid, Singles
+from rollcli.estimator.moments import Grid, Singles, rows_and_columns
 from rollcli.estimator.tuning import SampleTuning
 
 NO_STEP = np.float32(np.inf)  # to a neighbour without data: it agrees with no road
@@ -198,7 +198,7 @@ def _chosen(
             break
         # finer, for the valid ones may be a grid themselves
         spacing = Spacing.of(spacing.rows * spacing.columns * max(count, LEAST_PIXELS) / tuning.pixels)
-    rows, columns = (int(np.count_nonzero(chosen.any(axis=axis))) for axis in (1, 0))
+    rows, columns = rows_and_columns(chosen)
     if count < LEAST_PIXELS or min(rows, columns) < 2:
         found = f"{count} valid pixels away from the border, rows: {rows}, columns: {columns}"
         raise EstimationError(f"only {found}: too few to find a road in")
