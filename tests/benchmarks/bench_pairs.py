@@ -18,7 +18,7 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
-from rollcli.run.workers.pool import limit_blas_threads
+from rollcli.run.workers.pool import limit_blas_threads, prepare_worker
 
 limit_blas_threads()  # as the program does: else some milliseconds are threads that wait for each other
 
@@ -49,7 +49,7 @@ class Pair(NamedTuple):
 
 def main() -> None:
     """Print a line for each kind of pairs."""
-    cv2.setNumThreads(1)
+    prepare_worker()  # as the program does: one thread, and memory that is kept between pairs
     pairs = int(sys.argv[1]) if len(sys.argv) > 1 else 12
     with TemporaryDirectory() as folder:
         for size in ((640, 480), (1242, 375)):
