@@ -45,7 +45,8 @@ _NEAR, _END = 0.375, 0.0625
 # px: width of the matched block, and half its height; with 9, 11 and 15 real roads, or rendered ones, are a
 # little less right
 _BLOCK = 13
-_SPECKLE = 50, 2  # px of half the rows, and px of disparity: as of the match of all rows
+_PARTS = 1024  # of a pixel, that a plane is rounded to: processors differ in the last digits of sums
+_SPECKLE = 100, 2  # px, and sixteenths of a pixel from the plane. To look for them is 3 % of a pair's time
 _SPARE = 9  # rows above the plane's horizon. Of 224 pairs, four were off by more
 _MOST_ABOVE = 0.6  # of the height. Of 248 pairs the road's first row was at 0.49 at most
 # Shares: of the small map below the horizon that lies on the plane, and of this that is found along it. On 41
@@ -187,7 +188,8 @@ class Levelled:
         if whole or self.plane is None:
             disparity = without_lag(match_views(self.whole, first, count, options), options.mode)
             if near is not None:
-                np.copyto(disparity[self.top :], near.disparity, where=near.lies_on & (near.disparity > 0))
+                seen = near.without_speckles()
+                np.copyto(disparity[self.top :], seen, where=near.told & (seen > 0))
         else:
             disparity = self.coarse.copy()
             rows = disparity[self.top :]
@@ -195,7 +197,7 @@ class Levelled:
                 rows[:] = match_below(self.whole, first, count, options, self.top)
                 disparity = without_lag(disparity, options.mode)
             else:
-                np.copyto(rows, near.disparity, where=near.lies_on | (rows <= 0))
+                np.copyto(rows, near.disparity, where=near.told)
         if self.blank is not None:
             disparity[self.blank] = 0
         return disparity
@@ -218,7 +220,9 @@ def _resized(plane: Plane, shape: tuple[int, ...], to: tuple[int, ...]) -> Plane
     across, down = to[1] / shape[1], to[0] / shape[0]
     at_origin, a, b = across * plane[0], plane[1], plane[2] * across / down
     # the middle of a pixel is half a pixel from its corner
-    return at_origin + a * (1 - across) / 2 + b * (1 - down) / 2, a, b
+    at_origin += a * (1 - across) / 2 + b * (1 - down) / 2
+    at_origin, a, b = (round(each * _PARTS) / _PARTS for each in (at_origin, a, b))
+    return at_origin, a, b
 
 
 class _Near(NamedTuple):
@@ -228,12 +232,21 @@ class _Near(NamedTuple):
     ----------
     disparity : ndarray of float32
         Pixels; 0 where none is found.
-    lies_on : ndarray of bool
-        Where the small map is near the plane.
+    told : ndarray of bool
+        Where the small map is near the plane, or shows nothing.
+    from_plane : ndarray of int16
+        Sixteenths of a pixel; 0 where no disparity is found.
     """
 
     disparity: Map
-    lies_on: NDArray[np.bool_]
+    told: NDArray[np.bool_]
+    from_plane: NDArray[np.int16]
+
+    def without_speckles(self) -> Map:
+        """Return the disparities but for parts that lie alone: they move no angle, and a map shows them."""
+        parts = self.from_plane.copy()
+        cv2.filterSpeckles(parts, 0, *_SPECKLE)
+        return self.disparity * (parts > 0)
 
 
 def _match_along(pair: Levelled, plane: Plane, coarse: Map) -> _Near | None:
@@ -257,12 +270,13 @@ def _match_along(pair: Levelled, plane: Plane, coarse: Map) -> _Near | None:
     known &= (disparity > 0) & (disparity <= u)
     seen = coarse[first:]
     lies_on = np.abs(seen - straight) < np.float32(_NEAR * count)
-    lies_on &= seen > 0
+    shown = seen > 0
+    lies_on &= shown
     on = np.count_nonzero(lies_on)
     found = np.count_nonzero(lies_on & known & (np.abs(seen - disparity) < np.float32(_AS_FAR)))
-    if on < max(1, _FEWEST_ON * np.count_nonzero(seen)) or found < _FEWEST_FOUND * on:
+    if on < max(1, _FEWEST_ON * np.count_nonzero(shown)) or found < _FEWEST_FOUND * on:
         return None
-    return _Near(disparity * known, lies_on)
+    return _Near(disparity * known, lies_on | ~shown, sixteenths * known)
 
 
 def _match_blocks(views: Views, count: int) -> NDArray[np.int16]:
@@ -275,8 +289,6 @@ def _match_blocks(views: Views, count: int) -> NDArray[np.int16]:
     matcher = cv2.StereoBM.create(count, _BLOCK)
     matcher.setUniquenessRatio(0)  # a seventh of the match, and no angle changes
     matcher.setDisp12MaxDiff(1)
-    matcher.setSpeckleWindowSize(_SPECKLE[0])
-    matcher.setSpeckleRange(_SPECKLE[1])
     found = matcher.compute(
         *(
             cv2.copyMakeBorder(half_the_rows(each), beside, beside, 0, 0, cv2.BORDER_REFLECT_101)
