@@ -28,6 +28,7 @@ from rollcli.stereo.views import (
 )
 
 _KNOWN = 0.7  # share of a block that has to have a disparity
+_BORDER = 1.0  # px: what lies nearer to the right view's border, or beyond, is not compared
 _RIDGE = 0.2  # squared grey levels per pixel: gradients along the rows below this are noise
 _LEAST = 2.0  # the same, across the rows: a block with less says nothing
 _ROUNDING = 0.99  # of a sum of 64 float32
@@ -138,7 +139,7 @@ def measure_misalignment(
     """
     if min(disparity.shape) < BLOCK:
         return None
-    blocks = _Blocks(texture, disparity, every)
+    blocks = _Blocks(texture, disparity, start, every)
     found, last = start, None
     for done in range(1, rounds + 1):
         seen = blocks.vertical(found)
@@ -210,7 +211,7 @@ class _Shares(NamedTuple):
 class _Blocks:
     """The blocks of a pair; what does not change from round to round is computed once."""
 
-    def __init__(self, texture: Texture, disparity: Singles, every: int = 1) -> None:
+    def __init__(self, texture: Texture, disparity: Singles, start: Misalignment, every: int) -> None:
         self._right, self._shape = texture.right, texture.left.shape
         row, column = (np.arange(side // BLOCK) for side in disparity.shape)
         places = (row[:, None] + 2 * column) % every == 0
@@ -223,37 +224,36 @@ class _Blocks:
         # of a block's squares no more is left than all of them, over a count of `_KNOWN` of it or more
         telling = varies > np.float32(_LEAST * _KNOWN * _ROUNDING)
         places[places] = telling
-        far, self._down, self._seen = far[telling], down[telling], (far[telling] > 0).astype(np.float32)
+        far, self._down = far[telling], down[telling]
         self._left, self._across = blocks_at(texture.left, places), blocks_at(texture.across, places)
         rows, columns = (BLOCK * place[:, None].astype(np.float32) for place in np.nonzero(places))
         within = np.arange(BLOCK, dtype=np.float32)
         self._v = rows + np.repeat(within, BLOCK)
         self._u = columns + np.tile(within, BLOCK) - far
-        self._near = far.sum(axis=1) / np.maximum(self._seen.sum(axis=1), np.float32(1))
+        self._near = far.sum(axis=1) / np.maximum(np.count_nonzero(far, axis=1), 1).astype(np.float32)
         self._centre_x, centre_y = (np.float32((side - 1) / 2) for side in reversed(disparity.shape))
         self._y = self._v - centre_y
-        self._shares = _Shares.of(self._across, self._down, self._seen, self._u - self._centre_x, self._y)
+        seen = far > 0
+        read = seen_at(start, self._u, self._v, self._shape, self._near[:, None])
+        for at, side in zip(read, reversed(self._shape), strict=True):
+            seen &= (at > _BORDER) & (at < side - 1 - _BORDER)
+        self._shares = _Shares.of(
+            self._across, self._down, seen.astype(np.float32), self._u - self._centre_x, self._y
+        )
         self._along = np.zeros(len(self._u), np.float32)
 
     def vertical(self, at: Misalignment) -> row_fit.SeenBlocks:
         """Return the vertical disparities that are left when the right view is levelled by `at`."""
-        x, y = self._u - self._centre_x, self._y
-        height, width = self._shape
         u, v = seen_at(at, self._u, self._v, self._shape, self._near[:, None])
         if not len(u):
-            return row_fit.SeenBlocks(*(x[:, 0],) * 5)
+            return row_fit.SeenBlocks(*(self._near,) * 5)
         read_u, read_v, grey = grey_between(self._right, u, v)
         off = self._left - grey
         # else steps of less than a 64th of a pixel are none, or one, and measuring does not settle
         off -= self._across * (u - read_u) + self._down * (v - read_v)
         shift = np.einsum("ij,ij->i", self._shares.share, off)
         self._along = np.einsum("ij,ij->i", self._shares.along, off)
-        weight, mean_x, mean_y = (each.copy() for each in self._shares[3:])
-        inside = (u > 1) & (u < width - 2) & (v > 1) & (v < height - 2)
-        cut = np.flatnonzero(~inside.all(axis=1))  # few: those at the border
-        part = _Shares.of(self._across[cut], self._down[cut], self._seen[cut] * inside[cut], x[cut], y[cut])
-        shift[cut] = np.einsum("ij,ij->i", part.share, off[cut])
-        weight[cut], mean_x[cut], mean_y[cut] = part[3:]
+        _, _, _, weight, mean_x, mean_y = self._shares
         telling = weight > 0
         return row_fit.SeenBlocks(
             mean_x[telling], mean_y[telling], self._near[telling], shift[telling], weight[telling]
