@@ -3,7 +3,7 @@
 import base64
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import cv2
@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.files.encodings import read_disparity, to_disparity
+from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import read_image, read_stored
 from rollcli.pictures.derotate import derotate
 from rollcli.pictures.heights import CAMERA_HEIGHTS, METRES, FittedRoad, heights_over, steadied, unit_of
 from rollcli.pictures.overlay import draw_disparity, draw_heights, draw_road
 from rollcli.pictures.vdisparity import draw_v_disparity, row_offset, v_disparity
 from rollcli.report.sources import Subject
-from rollcli.rig.calibration import Calibration, for_matched
+from rollcli.run.options import FrameOptions
 from rollcli.run.read import FRAME_ERRORS, Source, read_source
 
 # small enough that a page with a dozen frames opens at once, large enough to see a stripe of noise
@@ -89,22 +89,17 @@ def _attempt(make: Callable[[], Made]) -> tuple[Made | None, str]:
 
 
 def _source(subject: Subject) -> Source:
+    frame, options = subject.frame, subject.options
     if "disparity" in subject.images:
-        return Source(read_disparity(subject.images["disparity"]))
+        of_map = replace(frame, path=subject.images["disparity"], right_path="", right_file="", mask=None)
+        source = read_source(of_map, FrameOptions())
+        height, width = source.disparity.shape
+        downscale = options.stereo.downscale if frame.right_file else 1.0
+        return replace(source, size=(round(width * downscale), round(height * downscale)))
     if subject.refused:
         raise InputError(subject.refused)
     # a pair's left image is kept where the road is to be drawn on it
-    images = subject.options.images._replace(road_mask="")
-    return read_source(subject.frame, subject.options._replace(images=images))
-
-
-def _calibration(subject: Subject, disparity: NDArray[Any]) -> Calibration | None:
-    """Scale the frame's calibration to its map."""
-    if subject.frame.calibration is None:
-        return None
-    height, width = disparity.shape
-    downscale = subject.options.stereo.downscale if subject.frame.right_file else 1.0
-    return for_matched(subject.frame.calibration, width, height, downscale)
+    return read_source(frame, options._replace(images=options.images._replace(road_mask="")))
 
 
 def _road(subject: Subject, source: Source | None) -> NDArray[Any] | None:
@@ -113,7 +108,7 @@ def _road(subject: Subject, source: Source | None) -> NDArray[Any] | None:
         return read_image(subject.images["road_mask"])
     if source is None or source.photo is None:
         return None
-    request = subject.options.method.request(calibration=_calibration(subject, source.disparity))
+    request = subject.options.method.request(calibration=source.calibrated(subject.frame.calibration))
     found = estimate_roll(source.disparity, request, mask=source.allowed, road_mask=True)
     # where options that the record does not give back led to another angle, this is not its road
     if found.road_mask is None or abs(found.theta - subject.theta) > _SAME:
@@ -155,7 +150,7 @@ def _heights(subject: Subject, source: Source | None) -> NDArray[Any] | None:
     if "heights" in subject.images:
         written = read_stored(subject.images["heights"]).values.astype(np.float32)
         return draw_heights(written, span, unit, photo)
-    calibration = None if source is None else _calibration(subject, source.shown)
+    calibration = None if source is None else source.calibrated(subject.frame.calibration)
     road = FittedRoad.of_row(subject.row, calibration)
     if source is None or road is None:
         return None
