@@ -289,6 +289,8 @@ def open_recording(
     name = os.fspath(path)
     layout = side_by_side if is_video(name) else None
     if is_video(name):
+        if topic or left_topic or right_topic:
+            raise UsageError(f"{name}: is a video, and has no topics: give side_by_side or right")
         frames, camera = _of_videos(name, None if right is None else os.fspath(right), layout), None
     else:
         files = bag_files(name)

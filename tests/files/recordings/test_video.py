@@ -300,8 +300,9 @@ def test_python_iterates_the_frames_of_a_video(tmp_path, drive):
         write_video(tmp_path / name, [each[side] for each in drive[2]], "FFV1")
     for frames in (found, other, package.open_recording(tmp_path / "a.avi", right=tmp_path / "b.avi")):
         np.testing.assert_array_equal([(each.left, each.right) for each in frames], drive[2])
-    with pytest.raises(UsageError, match="is a video: give side_by_side"):
-        list(package.open_recording(path))
+    for topic, said in ((None, "is a video: give side_by_side"), ("/maps", "is a video, and has no topics")):
+        with pytest.raises(UsageError, match=said):
+            list(package.open_recording(path, topic=topic))
     for elsewhere in ("s3://bucket/a.avi", "s3://bucket/a.mcap"):
         with pytest.raises(UsageError, match="recordings are read from local disk: download it first"):
             list(package.open_recording(elsewhere, side_by_side="left-right"))
