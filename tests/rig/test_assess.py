@@ -40,6 +40,11 @@ def test_a_single_row_is_a_frame_whatever_its_kind():
         assert (rig.count, rig.frames.files, rig.now().value) == (1, ["run/0.png"], pytest.approx(1.5))
 
 
+def test_a_name_loses_no_more_than_the_folders_that_all_have_in_common():
+    files = ["/data/0.png", "1.png"]
+    assert rollcli.assess_rig(columns([1.5] * 2, [0.1] * 2) | {"file": files}).names == files
+
+
 @pytest.mark.parametrize("frames", [3, 10])
 def test_rigs_that_differ_are_not_pooled_however_few_their_frames(frames):
     rng = np.random.default_rng(0)

@@ -320,12 +320,9 @@ def difference(before: Estimate, after: Estimate, quantity: Quantity) -> Estimat
 
 def short_names(files: Sequence[str]) -> list[str]:
     """Return paths without the folders that all have in common."""
-    folders = {file.rpartition("/")[0] for file in files}
-    parts = [folder.split("/") for folder in folders]
-    common = len(os.path.commonprefix(parts))  # noqa: RUF071 (of lists, part by part)
-    if not common or folders == {""}:
-        return list(files)
-    skipped = sum(len(part) + 1 for part in parts[0][: common - (len(folders) == 1)])
+    folders = {tuple(file.split("/")[:-1]) for file in files}
+    common = os.path.commonprefix(list(folders))  # noqa: RUF071 (of tuples, part by part)
+    skipped = sum(len(part) + 1 for part in common[: len(common) - (len(folders) == 1)])
     return [file[skipped:] for file in files]
 
 
