@@ -65,15 +65,12 @@ def test_images_of_two_sizes_are_two_drives_and_so_are_two_results():
         "width": [640] * 20 + [320] * 20,
         "height": [480] * 20 + [240] * 20,
     }
-    names = [each.name for each in rollcli.assess_rig(given).drives]
-    assert names == ["run (640x480)", "run (320x240)"]
+    assert [each.name for each in rollcli.assess_rig(given).drives] == ["run (640x480)", "run (320x240)"]
 
 
 def test_rolls_on_both_sides_of_a_right_angle_are_close_together():
-    rng = np.random.default_rng(0)
-    rolls = 89.8 + rng.normal(0, 0.5, 300)
-    wrapped = np.where(rolls > 90, rolls - 180, rolls)
-    rig = rollcli.assess_rig({"status": ["ok"] * 300, "roll_deg": wrapped})
+    rolls = 89.8 + np.random.default_rng(0).normal(0, 0.5, 300)
+    rig = rollcli.assess_rig({"status": ["ok"] * 300, "roll_deg": (rolls + 90) % 180 - 90})
     assert abs(rig.now().value - 89.8) < 0.2
 
 
