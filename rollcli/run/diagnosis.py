@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rollcli.errors import EstimationError, InputError
 from rollcli.estimator import tuning as estimator
 from rollcli.estimator.estimate import RollEstimate, estimate_roll
-from rollcli.estimator.request import Request
+from rollcli.estimator.request import DEFAULT_REQUEST, Request
 from rollcli.files.encodings import Encoding
 from rollcli.files.formats import Stored
 from rollcli.run.options import FrameOptions
@@ -228,7 +228,13 @@ def _grows_downward(disparity: NDArray[Any]) -> bool:
 def _has_road(disparity: NDArray[Any], options: FrameOptions) -> bool:
     """Tell whether a road is found that gives no reason for doubt, however uncertain its angle is."""
     request = Request(max_interval=TUNING.wide, seed=options.method.seed, tuning=_ANY_ANGLE)
+    return sure_estimate(disparity, request) is not None
+
+
+def sure_estimate(disparity: NDArray[Any], request: Request = DEFAULT_REQUEST) -> RollEstimate | None:
+    """Estimate the roll of a map, shape (H, W), px, 0 is no data; None unless the estimate is `ok`."""
     try:
-        return estimate_roll(disparity, request).status == "ok"
+        estimate = estimate_roll(disparity, request)
     except EstimationError:
-        return False
+        return None
+    return estimate if estimate.status == "ok" else None

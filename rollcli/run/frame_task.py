@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import EstimationError, InputError
+from rollcli.errors import InputError
 from rollcli.estimator.estimate import RollEstimate, estimate_roll
 from rollcli.files.codecs.png import encode_png
 from rollcli.files.codecs.tiff import encode_tiff
@@ -24,7 +24,7 @@ from rollcli.pictures.overlay import draw_heights, draw_preview, draw_road
 from rollcli.pictures.vdisparity import draw_v_disparity, middle_row, profile, row_offset, v_disparity
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import horizon_row, with_pose
-from rollcli.run.diagnosis import estimate_or_liken, looks_like
+from rollcli.run.diagnosis import estimate_or_liken, looks_like, sure_estimate
 from rollcli.run.frame import Frame, FrameResult
 from rollcli.run.options import (
     DerotateOptions,
@@ -259,7 +259,7 @@ def _counted(source: Source, of: Frame, options: VDisparityOptions, paths: Mappi
         figure = v_disparity_figure(source.disparity, theta, road.alpha, options.figure, **counting)
         return {paths["vdisparity"]: figure}, dict(source.warnings)
     histogram = v_disparity(source.disparity, **counting)
-    estimate = _sure_estimate(source)
+    estimate = sure_estimate(source.disparity)
     curve, horizon, likeness = None, None, ""
     if estimate is None:
         likeness = looks_like(source.disparity, source.stored, options.frame)
@@ -272,15 +272,6 @@ def _counted(source: Source, of: Frame, options: VDisparityOptions, paths: Mappi
     if options.counts:
         files[paths["counts"]] = encode_stored(histogram.counts, "tiff")
     return files, {**source.warnings, likeness: likeness}
-
-
-def _sure_estimate(source: Source) -> RollEstimate | None:
-    """Find the road; None unless the estimate is `ok`."""
-    try:
-        estimate = estimate_roll(source.disparity)
-    except EstimationError:
-        return None
-    return estimate if estimate.status == "ok" else None
 
 
 def _heights_of_row(
