@@ -266,13 +266,13 @@ def _write_parts(
     frames: Span[Frame], status: bytes, lines: Sequence[bytes], notes: Sequence[bytes], options: BatchOptions
 ) -> int:
     """Write the parts that the lines fill, if they begin with one; return how many lines that were."""
-    parts, written, (writes, root) = options.parts, 0, (options.frame.writes, options.frame.root)
+    parts, written, writes = options.parts, 0, options.frame.writes
     while parts and frames.first % parts.rows == 0 and written < len(lines):
         first = frames.first + written
         end = written + min(parts.rows, parts.frames - first)
         if end > len(lines):
             break
-        sync_files(local_files(frames[written:end], status[written:end], writes, root))
+        sync_files(local_files(frames[written:end], status[written:end], writes))
         parts.write(parts.numbers[first // parts.rows], lines[written:end], notes[written:end])
         written = end
     return written

@@ -65,7 +65,7 @@ def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
 
     with noting(options.notes) as notes:
         result = guarded(frame, work)
-    paths = every_path(frame, options.writes, options.root)
+    paths = every_path(frame, options.writes)
     write_outputs(files, paths, replaces=options.replaces, retry_of=options.retry_of)
     elapsed = 1000 * (time.perf_counter() - start)
     noted = {**notes, **(frame.decoded.notes if frame.decoded else {})}
@@ -165,7 +165,7 @@ def _encode_images(frame: Frame, pictured: Pictured) -> tuple[dict[str, bytes], 
 
 def _usual_paths(frame: Frame, options: FrameOptions) -> dict[str, str]:
     """Name the files of a frame, by their kinds."""
-    return {kind: options.at(usual) for kind, (usual, *_) in possible_paths(frame, options.writes)}
+    return {kind: usual for kind, (usual, *_) in possible_paths(frame, options.writes)}
 
 
 def encode_turned(source: Source, roll: float, given: EncodingOptions, *, expand: bool = False) -> bytes:

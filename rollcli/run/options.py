@@ -327,11 +327,11 @@ class RunningOptions(NamedTuple):
 class FrameOptions(NamedTuple):
     """What decides the row and the files of a frame: everything that a worker is told beside the frame.
 
-    `writes` are its files. `root` is the folder where relative paths start, for workers on other machines;
-    empty for this one. `replaces` tells whether files that are in the place of an image are replaced.
-    `retry_of` names the result whose failed frames are done again; empty otherwise. `notes` tells whether
-    workers say what each frame was read from. `convert` is the conversion that makes the files; None: the
-    roll is estimated.
+    `writes` are its files, as a worker locates them. `root` is the folder where relative paths start, for
+    workers on other machines; empty for this one. `replaces` tells whether files that are in the place of an
+    image are replaced. `retry_of` names the result whose failed frames are done again; empty otherwise.
+    `notes` tells whether workers say what each frame was read from. `convert` is the conversion that makes
+    the files; None: the roll is estimated.
     """
 
     encoding: EncodingOptions = EncodingOptions()
@@ -446,15 +446,15 @@ class FramesOptions:
     @property
     def frame(self) -> FrameOptions:
         """What a worker is told of the frames."""
-        return FrameOptions(
+        told = FrameOptions(
             self.encoding,
             self.stereo,
             self.region,
             side_by_side=self.pairs.side_by_side,
-            writes=self.writes,
             root=self.running.root,
             replaces=self.running.overwrite,
         )
+        return told._replace(writes=tuple(each._replace(folder=told.at(each.folder)) for each in self.writes))
 
 
 @dataclass(frozen=True, kw_only=True)

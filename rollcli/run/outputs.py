@@ -18,7 +18,7 @@ from rollcli.files.containers import file_of, shown
 from rollcli.files.naming import gathered
 from rollcli.files.results import STATUSES
 from rollcli.files.storage import create, read_bytes, remove, remove_all, write_bytes
-from rollcli.files.stores.locations import is_object_url, is_url, located, public_name, within
+from rollcli.files.stores.locations import is_object_url, is_url, public_name, within
 from rollcli.files.stores.objects import list_objects
 from rollcli.run.frame import Frame
 from rollcli.run.options import ENDING_OF_FORMAT, RunningOptions, Written
@@ -37,26 +37,21 @@ def roomy_path(path: str) -> str:
     return posixpath.splitext(path)[0] + ENDING_OF_FORMAT["tiff"]
 
 
-def local_files(
-    frames: Iterable[Frame], status: bytes, writes: Sequence[Written], root: str = ""
-) -> Iterator[str]:
+def local_files(frames: Iterable[Frame], status: bytes, writes: Sequence[Written]) -> Iterator[str]:
     """Yield the files of those frames that have angles which a power cut may take from a local disk."""
     angled = (frame for frame, at in zip(frames, status, strict=True) if STATUSES[at] != "error")
-    return itertools.filterfalse(is_url, files_of(angled, writes, root))
+    return itertools.filterfalse(is_url, files_of(angled, writes))
 
 
-def every_path(frame: Frame, writes: Iterable[Written], root: str = "") -> list[str]:
-    """List every file that may be written for a frame, from a folder where relative paths start.
-
-    There is none of a frame whose URL names no file.
-    """
-    return [located(root, path) for _, paths in possible_paths(frame, writes) for path in paths]
+def every_path(frame: Frame, writes: Iterable[Written]) -> list[str]:
+    """List every file that may be written for a frame; there is none where its URL names no file."""
+    return [path for _, paths in possible_paths(frame, writes) for path in paths]
 
 
-def files_of(frames: Iterable[Frame], writes: Sequence[Written], root: str = "") -> Iterator[str]:
+def files_of(frames: Iterable[Frame], writes: Sequence[Written]) -> Iterator[str]:
     """Yield every file that may be written for frames; a list of them would take most of our memory."""
     for frame in frames if writes else ():
-        yield from every_path(frame, writes, root)
+        yield from every_path(frame, writes)
 
 
 def write_outputs(
