@@ -75,7 +75,7 @@ class FileOutput(Output):
 
     def __init__(self, file: ResultFile, inputs: ResultFile, record: RunRecord, kept: KeptRows) -> None:
         super().__init__(record, kept)
-        self._file, self._inputs, self._written = file, inputs, 0
+        self._file, self._inputs = file, inputs
         self._rows: list[bytes] = []  # which wait for their images
         self._folders: set[Path] = set()  # whose names are on the disk
         self._last = time.monotonic()
@@ -109,7 +109,7 @@ class FileOutput(Output):
         rows, self._rows = self._rows, []  # first: what follows an interrupt must not write one again
         if rows:
             self._file.append(b"".join(rows))
-            self._written += len(rows)
+            self._rows_there += len(rows)
 
     def commit(self) -> None:
         """Force the images and rows that were added to the disk."""
@@ -126,9 +126,8 @@ class FileOutput(Output):
             self._end_replacing()
 
     def hint(self) -> str:
-        """Say that --resume continues, if rows were written and their file still is there."""
-        rows = self.kept.count + self._written
-        return f"; {rows} rows are kept, continue with --resume" if rows and self._file.is_there() else ""
+        """Say that --resume continues, if the file still is there."""
+        return super().hint() if self._file.is_there() else ""
 
 
 _CHECK_S = 10.0  # a request of 50 ms now and then
@@ -150,7 +149,6 @@ class PartsOutput(Output):
         )
         self._waiting: list[tuple[int, bytes, bytes]] = []  # positions, rows, and the lines of their inputs
         self._checked = time.monotonic()
-        self._written = kept.count - len(kept.holes)
 
     def parts_of(self, step: Step) -> Parts | None:
         """Say which parts the workers write of which they have all rows."""
@@ -165,7 +163,7 @@ class PartsOutput(Output):
             self.record.check_owned()
             self._checked = time.monotonic()
         done = batch.in_parts
-        self._written += done
+        self._rows_there += done
         self._waiting += zip(positions[done:], batch.lines, batch.notes, strict=True)
         self._take_images(frames[done:], batch.figures.status[done:])
         while len(self._waiting) >= self._part_rows:
@@ -202,10 +200,6 @@ class PartsOutput(Output):
             self.record.check_owned()
             write_bytes(location, self._parts.encoded(number, lines), durable=True)
 
-    def hint(self) -> str:
-        """Say that --resume continues after the last part."""
-        return f"; {self._written} rows are kept, continue with --resume" if self._written else ""
-
     def _sync_images(self) -> None:
         sync_files(self._images)
         self._images.clear()
@@ -214,7 +208,7 @@ class PartsOutput(Output):
         self._sync_images()
         positions, lines, notes = zip(*self._waiting[: self._part_rows], strict=True)
         self._parts.write(positions[0] // self._part_rows, lines, notes)
-        self._written += len(lines)
+        self._rows_there += len(lines)
         self._waiting = self._waiting[self._part_rows :]
 
 

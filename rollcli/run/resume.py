@@ -421,6 +421,7 @@ class Output:
 
     def __init__(self, record: RunRecord, kept: KeptRows) -> None:
         self.record, self.kept, self._plan = record, kept, record.plan
+        self._rows_there = kept.count - len(kept.holes)
         # what takes the place of kept rows, by their positions, and of the lines of their inputs
         self._new_rows: dict[int, bytes] = {}
         self._new_notes: dict[int, bytes] = {}
@@ -442,7 +443,7 @@ class Output:
 
     def hint(self) -> str:
         """Say that --resume continues, if rows are kept; a stream keeps none."""
-        return ""
+        return f"; {self._rows_there} rows are kept, continue with --resume" if self._rows_there else ""
 
     def restore(self, frames: Sequence[Frame], batch: Batch) -> None:
         """Take the images of incomplete frames, which were made again.
