@@ -165,17 +165,14 @@ def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> tuple[li
     first = next(iter(frames), None)
     if first is None or (first.calibration is None and options.side_by_side is None):
         return [], None
-    from rollcli.files.formats import read_stored  # only here does a dispatcher decode an image
-    from rollcli.run.read import read_views
+    from rollcli.run.read import read_map, read_views  # only here does a dispatcher decode an image
     from rollcli.stereo.views import matched_shape
 
     try:
         if first.right_file:
             shape = read_views(first, options)[0].shape[:2]
         else:
-            shape = read_stored(
-                options.at(first.path), first.file, rgb=options.encoding.encoding == "foundationstereo"
-            ).values.shape
+            shape = read_map(first, options).values.shape
     except InputError:
         return [], None  # its row will say so
     height, width = shape

@@ -230,9 +230,14 @@ def read_source(frame: Frame, options: FrameOptions) -> Source:
     return source if allowed is None else replace(source, allowed=allowed)
 
 
+def read_map(frame: Frame, options: FrameOptions) -> Stored:
+    """Read the numbers of a map as they are stored."""
+    rgb = options.encoding.encoding == Encoding.FOUNDATIONSTEREO
+    return read_stored(options.at(frame.path), frame.file, rgb=rgb)
+
+
 def _read(frame: Frame, options: FrameOptions) -> Source:
-    given = options.encoding
-    stored = read_stored(options.at(frame.path), frame.file, rgb=given.encoding == Encoding.FOUNDATIONSTEREO)
+    stored, given = read_map(frame, options), options.encoding
     if given.scale is None or given.scale > 0:
         require_positive(stored, frame.file)
     found = to_disparity(stored, **given._asdict(), calibration=frame.calibration)
