@@ -141,7 +141,8 @@ class Levelled:
         if self.find_road is None or self._small is None:
             return None
         found = self.find_road(self._small, _SMALLER)
-        return None if found is None else _resized(found, self._small.shape, self.shape)
+        plane = None if found is None else _resized(found, self._small.shape, self.shape)
+        return plane if plane and plane[2] > 0 else None  # a level one, which rounding may leave, is no road
 
     @cached_property
     def top(self) -> int:
