@@ -231,15 +231,12 @@ class _Blocks:
         self._v = rows + np.repeat(within, BLOCK)
         self._u = columns + np.tile(within, BLOCK) - far
         self._near = far.sum(axis=1) / np.maximum(np.count_nonzero(far, axis=1), 1).astype(np.float32)
-        self._centre_x, centre_y = (np.float32((side - 1) / 2) for side in reversed(disparity.shape))
-        self._y = self._v - centre_y
-        seen = far > 0
-        read = seen_at(start, self._u, self._v, self._shape, self._near[:, None])
-        for at, side in zip(read, reversed(self._shape), strict=True):
-            seen &= (at > _BORDER) & (at < side - 1 - _BORDER)
-        self._shares = _Shares.of(
-            self._across, self._down, seen.astype(np.float32), self._u - self._centre_x, self._y
-        )
+        height, width = self._shape
+        u, v = seen_at(start, self._u, self._v, self._shape, self._near[:, None])
+        seen = (far > 0) & (u > _BORDER) & (u < width - 1 - _BORDER)
+        seen &= (v > _BORDER) & (v < height - 1 - _BORDER)
+        x, y = self._u - np.float32((width - 1) / 2), self._v - np.float32((height - 1) / 2)
+        self._shares = _Shares.of(self._across, self._down, seen.astype(np.float32), x, y)
         self._along = np.zeros(len(self._u), np.float32)
 
     def vertical(self, at: Misalignment) -> row_fit.SeenBlocks:
@@ -253,11 +250,9 @@ class _Blocks:
         off -= self._across * (u - read_u) + self._down * (v - read_v)
         shift = np.einsum("ij,ij->i", self._shares.share, off)
         self._along = np.einsum("ij,ij->i", self._shares.along, off)
-        _, _, _, weight, mean_x, mean_y = self._shares
-        telling = weight > 0
-        return row_fit.SeenBlocks(
-            mean_x[telling], mean_y[telling], self._near[telling], shift[telling], weight[telling]
-        )
+        shares, telling = self._shares, self._shares.weight > 0
+        told = shares.x, shares.y, self._near, shift, shares.weight
+        return row_fit.SeenBlocks(*(each[telling] for each in told))
 
     def follow(self, step: Misalignment) -> None:
         """Move the blocks along the rows, to where the grey levels agree once the views lie `step` further.

@@ -348,13 +348,19 @@ def grey_between(
 _STRIP = 64  # rows: what they need of a view twice as large stays in the processor's cache
 
 
+def rows_around(v: Singles, height: int) -> slice:
+    """Return the rows of a view that `smoothed_between` sees for points in rows v: one more beside each."""
+    top = max(0, min(int(v.min()), height) - 3)
+    return slice(top, max(top, int(v.max())) + 4)
+
+
 def grey_along(view: View, u: Singles, v: Singles) -> View:
     """Return what `grey_between` does of the view `smoothed_between`, in rows that change little."""
     grey = np.empty(u.shape, np.uint8)
     for rows in strips(len(u), _STRIP):
-        top = max(0, min(int(v[rows].min()), len(view)) - 3)  # smoothing sees a row beside each of a point's
-        bottom = max(top, int(v[rows].max())) + 4
-        grey[rows] = grey_between(smoothed_between(view[top:bottom]), u[rows], v[rows] - np.float32(top))[2]
+        near = rows_around(v[rows], len(view))
+        twice = smoothed_between(view[near])
+        grey[rows] = grey_between(twice, u[rows], v[rows] - np.float32(near.start))[2]
     return grey
 
 

@@ -85,6 +85,7 @@ def test_a_disparity_that_hides_the_offset_is_taken_back(noise):
         offsets.append(measure_misalignment(Texture.of(views), wall(10.4), rounds=30).misalignment.offset)
 
     assert np.mean(offsets) == pytest.approx(0.4, abs=0.03)
+    assert offsets == pytest.approx([0.4] * 20, abs=0.1)
 
 
 @pytest.mark.parametrize("shape", [(7, 100), (100, 7)])
