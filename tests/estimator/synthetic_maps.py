@@ -10,7 +10,7 @@ from rollcli.estimator.energy import Energy, Terms
 from rollcli.estimator.moments import map_moments
 from rollcli.rig.calibration import Calibration
 
-# the same examples each time, however busy the machine
+# the same examples wherever the same modules are loaded, however busy the machine
 repeatable = settings(derandomize=True, max_examples=60, database=None)
 
 
