@@ -204,7 +204,7 @@ def test_numbers_and_rows_of_numpy_are_taken_or_refused_in_words():
         rollcli.estimate_roll(typed_client.road(0.1), calibration=left)
 
 
-def test_what_a_masked_array_hides_is_no_data(disparity):
+def test_what_a_masked_array_hides_and_what_is_beyond_any_disparity_is_no_data(disparity):
     hidden = np.zeros(disparity.shape, bool)
     hidden[:, 300:] = True
     masked = np.ma.MaskedArray(disparity, hidden)
@@ -212,10 +212,11 @@ def test_what_a_masked_array_hides_is_no_data(disparity):
     estimate = rollcli.estimate_roll(masked)
     assert estimate.to_dict() == rollcli.estimate_roll(cut).to_dict()
     assert estimate.to_dict() != rollcli.estimate_roll(disparity).to_dict()
-    assert np.array_equal(rollcli.v_disparity(masked).counts, rollcli.v_disparity(cut).counts)
-    assert np.array_equal(rollcli.derotate(masked, 0.1), rollcli.derotate(cut, 0.1))
-    heights, same = (rollcli.height_map(each, estimate) for each in (masked, cut))
-    assert np.array_equal(heights, same, equal_nan=True)
+    heights = rollcli.height_map(cut, estimate)
+    for given in (masked, np.where(hidden, np.float32(1e15), disparity)):
+        assert np.array_equal(rollcli.v_disparity(given).counts, rollcli.v_disparity(cut).counts)
+        assert np.array_equal(rollcli.derotate(given, 0.1), rollcli.derotate(cut, 0.1))
+        assert np.array_equal(rollcli.height_map(given, estimate), heights, equal_nan=True)
     regions = np.ma.MaskedArray(np.ones(disparity.shape), hidden), ~hidden
     of_masked, of_mask = (rollcli.estimate_roll(disparity, mask=each).to_dict() for each in regions)
     assert of_masked == of_mask

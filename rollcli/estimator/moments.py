@@ -114,6 +114,12 @@ def _with_hidden_as_0(values: ArrayLike) -> NDArray[Any]:
     return np.asarray(values.filled(0) if isinstance(values, np.ma.MaskedArray) else values)
 
 
+def has_disparity(values: NDArray[Any]) -> NDArray[np.bool_]:
+    """Tell which numbers of a map are disparities: above 0, and not beyond `LARGEST`."""
+    known: NDArray[np.bool_] = (values > 0) & (values < LARGEST)
+    return known
+
+
 def strips(height: int, rows: int) -> list[slice]:
     """Return the rows of a map in slices of so many, or of one: for large maps, or the processor's cache."""
     rows = max(1, rows)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
-from rollcli.estimator.moments import Floats, map_of, strips
+from rollcli.estimator.moments import Floats, has_disparity, map_of, strips
 
 Flags = NDArray[np.bool_]
 
@@ -28,8 +28,8 @@ def derotate(
     Parameters
     ----------
     disparity : array_like, shape (H, W)
-        Any real dtype: pixels, or numbers as they are stored. NaN, inf, <= 0, the largest number of 16 bits
-        and what a masked array hides are no data.
+        Any real dtype: pixels, or numbers as they are stored. NaN, inf, <= 0, what is beyond 1e15, the
+        largest number of 16 bits and what a masked array hides are no data.
     roll : float
         theta of the estimate, radians, from -pi to pi.
     roll_deg : float
@@ -147,7 +147,7 @@ def _centred(shape: tuple[int, ...]) -> tuple[Floats, Floats]:
 
 
 def _validity(values: NDArray[Any], invalid: Iterable[float]) -> Flags:
-    valid: Flags = np.isfinite(values) & (values > 0)
+    valid: Flags = has_disparity(values)
     of_16_bits = values.dtype.kind in "iu" and values.dtype.itemsize == 2  # of either byte order
     saturated = [np.iinfo(values.dtype).max] if of_16_bits else []
     with np.errstate(over="ignore"):  # a value may lie beyond what the dtype holds

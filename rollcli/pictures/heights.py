@@ -307,7 +307,7 @@ class _Profile:
         doffs = 0.0 if calibration is None else calibration.doffs
         with np.errstate(over="ignore"):  # what becomes inf is no data
             d = stored.astype(np.float32)
-        known = (d > np.float32(max(0.0, -doffs))) & (d <= LARGEST)
+        known = (d > np.float32(max(0.0, -doffs))) & (d < LARGEST)
         d[~known] = self.disparity
         rest: Singles | np.float32 = np.float32(1)
         root: Singles | np.float32 = np.float32(1)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
-from rollcli.estimator.moments import map_of, strips
+from rollcli.estimator.moments import has_disparity, map_of, strips
 from rollcli.estimator.road.model import Parabola
 from rollcli.pictures.overlay import FONT, FONT_SIZE, INK, Pixels, round_step
 
@@ -42,7 +42,7 @@ def v_disparity(
     Parameters
     ----------
     disparity : array_like, shape (H, W)
-        Pixels; NaN, inf, <= 0 and what a masked array hides are no data.
+        Pixels; NaN, inf, <= 0, what is beyond 1e15 and what a masked array hides are no data.
     bins : int, optional
         At most 65535; by default one a pixel for maps of whole pixels, else four a pixel and at least 256,
         within 1024.
@@ -79,7 +79,7 @@ def v_disparity(
 
 def _pixels(values: NDArray[Any]) -> NDArray[np.float64]:
     """Disparities; what is no data is 0."""
-    return np.where(np.isfinite(values) & (values > 0), values, 0).astype(np.float64)
+    return np.where(has_disparity(values), values, 0).astype(np.float64)
 
 
 def _counts(pixels: NDArray[np.float64], bins: int, max_disparity: float) -> NDArray[np.int32]:
