@@ -14,7 +14,7 @@ from rollcli.files.naming import listed, natural_key
 from rollcli.files.storage import STREAM, is_stream, write_output
 from rollcli.files.stores.locations import base_name, is_remote
 from rollcli.messages import say
-from rollcli.rig.drive.assess import RigAssessment, RigFrames, assess_frames, difference, short_names
+from rollcli.rig.drive.assess import RigAssessment, RigFrames, assess_frames, difference, doubled, short_names
 from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.quantities import ALIGNMENT, COLUMNS, QUANTITIES, ROLL
 from rollcli.rig.words import findings
@@ -74,7 +74,7 @@ Part = results.Result | results.ResultColumns  # one of several that are put tog
 
 
 def require_rows(parts: Sequence[Part], purpose: str) -> None:
-    """Refuse results without rows; of several shards some may have none, as of few frames.
+    """Refuse results without rows, and with several of one frame; of several shards some may have none.
 
     Raises
     ------
@@ -84,6 +84,8 @@ def require_rows(parts: Sequence[Part], purpose: str) -> None:
     for part in parts:
         if not (part.files or (some and _shard(part) not in (None, (1, 1)))):
             raise InputError(f"{part.path}: has no rows: there is nothing to {purpose}")
+        if (file := doubled(part.files)) is not None:
+            raise InputError(f"{part.path}: has several rows of {file}: keep one, or give one file a run")
 
 
 def order_of(parts: Sequence[Part]) -> tuple[NDArray[np.intp], list[str]]:
@@ -172,13 +174,10 @@ def _shard(part: Part) -> tuple[int, int] | None:
 def _by_name(parts: Sequence[Part]) -> NDArray[np.intp]:
     """Without records: the natural order of the names, in which a run's frames are."""
     owner: dict[str, str] = {}
-    for part in parts:
-        for file in part.files:
-            first = owner.setdefault(file, part.path)
-            if first != part.path:
-                raise UsageError(
-                    f"{first} and {part.path} both have a row of {file}: they are no shards of one run"
-                )
+    for path, file in ((part.path, file) for part in parts for file in part.files):
+        if (first := owner.setdefault(file, path)) != path:
+            both = f"{first} and {path} both have a row of {file}"
+            raise UsageError(f"{both}: they are no shards of one run")
     keys = [natural_key(file) for part in parts for file in part.files]
     return np.array(sorted(range(len(keys)), key=keys.__getitem__), dtype=np.intp)
 
