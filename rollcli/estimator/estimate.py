@@ -37,7 +37,7 @@ class RollEstimate:
     global_minimum : bool or None
         Whether `theta` is the proven global minimum of the energy; None for methods that do not minimise it.
     rmse : float
-        Root mean squared residual of the pixels used, px.
+        Root mean squared residual of the pixels used, px; with `road` "auto" of weighted averages of five.
     alpha : tuple of float
         The road's (a0, a1, a2), px, y measured from the centre of the top-left pixel.
     valid_fraction, road_fraction : float
