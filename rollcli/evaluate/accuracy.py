@@ -312,7 +312,7 @@ def _values(found: Comparison) -> dict[str, Any]:
     for distance in DISTANCES_M:
         part, before = found.heights.get(distance), f"over_road_at_{distance}_m_"
         values[f"{before}frames"] = None if part is None else part.count
-        values |= _named(part, ("median", "p95", "bias"), before, "m")
+        values |= _named(part, _LENGTHS, before, "m")
     return {name: round(v, _DIGITS) if isinstance(v, float) else v for name, v in values.items()}
 
 
