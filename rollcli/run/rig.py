@@ -176,8 +176,8 @@ def _by_name(parts: Sequence[Part]) -> NDArray[np.intp]:
     owner: dict[str, str] = {}
     for path, file in ((part.path, file) for part in parts for file in part.files):
         if (first := owner.setdefault(file, path)) != path:
-            both = f"{first} and {path} both have a row of {file}"
-            raise UsageError(f"{both}: they are no shards of one run")
+            both = f"{first} and {path} both have a row of {file}: they are no shards"
+            raise UsageError(f"{both}; results of several runs need FILE.run.json beside them")
     keys = [natural_key(file) for part in parts for file in part.files]
     return np.array(sorted(range(len(keys)), key=keys.__getitem__), dtype=np.intp)
 
