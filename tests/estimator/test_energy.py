@@ -53,16 +53,12 @@ def test_energy_is_that_of_a_least_squares_fit(disparity, theta, parabolic):
 @given(random_maps(), angles, st.booleans())
 def test_gradient_and_curvature_agree_with_central_differences(disparity, theta, parabolic):
     energy = energy_of(disparity, parabolic=parabolic)
-    terms, everywhere = energy.at(theta), at_each(energy, ANGLES)
-    step = 1e-3  # radians
-    slope = central(lambda t: energy.at(t).value, theta, step)
-    bend = central(lambda t: energy.at(t).gradient, theta, step)
-    rounding = np.finfo(float).eps / step
-    for found, expected, of, scale in (
-        (terms.gradient, slope, terms.value, np.abs(everywhere.gradient).max()),
-        (terms.curvature, bend, terms.gradient, np.abs(everywhere.curvature).max()),
-    ):
-        assert found == pytest.approx(expected, rel=1e-6, abs=1e-8 * scale + rounding * abs(of))
+    terms, everywhere, step = energy.at(theta), at_each(energy, ANGLES), 1e-3
+    for function, derivative in (("value", "gradient"), ("gradient", "curvature")):
+        expected = central(lambda t: getattr(energy.at(t), function), theta, step)  # noqa: B023
+        rounding = np.finfo(float).eps / step * abs(getattr(terms, function))
+        most = 1e-8 * np.abs(getattr(everywhere, derivative)).max() + rounding
+        assert getattr(terms, derivative) == pytest.approx(expected, rel=1e-6, abs=most)
 
 
 @repeatable
