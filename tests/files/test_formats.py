@@ -143,6 +143,7 @@ def foundation_stereo(disparity):
 
 def test_numbers_in_three_channels_are_read_and_written_back(tmp_path):
     disparity = road_map()
+    disparity[0, 0] = 255.2 * 255**2 / 1000  # its first digit is as large as that of a white pixel
     (tmp_path / "a.png").write_bytes(foundation_stereo(disparity))
     found = read_disparity(*os.scandir(tmp_path), encoding="foundationstereo")
     np.testing.assert_allclose(found, np.where(disparity > 0, disparity, 0), atol=0.00051)

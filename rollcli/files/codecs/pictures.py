@@ -121,17 +121,11 @@ def decode_rgb(data: bytes) -> Stored:
 
 
 def encode_rgb(values: NDArray[Any]) -> bytes:
-    """Return a PNG of whole numbers in three channels, as `decode_rgb` reads it.
-
-    Raises
-    ------
-    OutputError
-        A number needs a fourth digit.
-    """
-    if values.max(initial=0) >= _BASE**3:
-        raise OutputError("disparities above 16581 px do not fit the channels of an RGB PNG")
-    digits = [values % _BASE, values // _BASE % _BASE, values // _BASE**2]
-    return bytes(cv2.imencode(".png", np.dstack(digits).astype(np.uint8))[1])
+    """Return a PNG of whole numbers in three channels, as `decode_rgb` reads it."""
+    red = np.minimum(values // _BASE**2, _BASE)  # 255, as in a white pixel, is a digit too
+    rest = values - red * _BASE**2
+    green = np.minimum(rest // _BASE, _BASE)
+    return bytes(cv2.imencode(".png", np.dstack([rest - green * _BASE, green, red]).astype(np.uint8))[1])
 
 
 def decode_exr(data: bytes) -> Stored:
