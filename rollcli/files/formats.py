@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import InputError, UsageError, about
+from rollcli.errors import InputError, about
 from rollcli.estimator.moments import usable_of
 from rollcli.files.codecs import arrays, pictures, png, tiff
 from rollcli.files.codecs.raw_map import Stored as Stored
@@ -122,12 +122,8 @@ def encode_stored(
     Raises
     ------
     OutputError
-        The format does not hold such numbers.
-    UsageError
-        There is no such format.
+        This OpenCV writes no EXR.
     """
-    if format not in MAP_FORMATS:
-        raise UsageError(f"{format}: unknown map format; {', '.join(MAP_FORMATS)} are written")
     return MAP_FORMATS[format].encode(values, nodata, text)
 
 

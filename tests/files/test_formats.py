@@ -12,20 +12,12 @@ import numpy as np
 import pytest
 
 from rollcli import read_disparity
-from rollcli.errors import InputError, OutputError, UsageError
+from rollcli.errors import InputError
 from rollcli.files.formats import decode_stored, encode_stored
 from rollcli.files.storage import read_bytes
 from tests.binary_files import disparity_map, make_npy, make_npz, make_png, make_tiff, png_file
 from tests.files.codecs.test_png import NOISY, WRONG
 from tests.run_cli import python, road_map, rollcli
-
-
-def test_numbers_that_a_format_cannot_hold_are_refused():
-    for form, kind in (("png", "f4"), ("png", "i2"), ("pfm", "f8"), ("pfm", "u1")):
-        with pytest.raises(OutputError, match="write TIFF or NPY instead"):
-            encode_stored(np.ones((2, 2), kind), form)
-    with pytest.raises(UsageError, match="jpg: unknown map format"):
-        encode_stored(np.ones((2, 2)), "jpg")
 
 
 def test_paths_that_are_no_files_are_named(tmp_path):

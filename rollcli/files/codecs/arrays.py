@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import InputError, OutputError
+from rollcli.errors import InputError
 from rollcli.files.bounded import most_unpacked
 from rollcli.files.codecs import raw_map
 from rollcli.files.codecs.raw_map import Stored, native
@@ -149,7 +149,5 @@ def check_pfm(data: bytes, size: int) -> tuple[str, int, int, int]:
 
 def encode_pfm(values: NDArray[Any]) -> bytes:
     """Return a little-endian single-channel PFM file of float32 values."""
-    if values.dtype != np.float32:
-        raise OutputError(f"a PFM holds float32, not {values.dtype}: write TIFF or NPY instead")
     height, width = values.shape
     return b"Pf\n%d %d\n-1.0\n" % (width, height) + values[::-1].astype("<f4").tobytes()

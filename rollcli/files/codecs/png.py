@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import InputError, OutputError
+from rollcli.errors import InputError
 from rollcli.files.codecs.raw_map import COLOUR_REMEDY, Stored, require_decoded_fits
 
 # a camera image as it lies in the file, grey or BGR: turning it by its EXIF tag would break rectification
@@ -208,8 +208,6 @@ def picture(data: bytes, *, mask: bool = False) -> NDArray[Any]:
 
 def encode_png(values: NDArray[Any], text: str = "") -> bytes:
     """Return a PNG file of (H, W) or BGR (H, W, 3) values, uint8 or uint16, and an ASCII text beside them."""
-    if values.dtype not in (np.uint8, np.uint16):
-        raise OutputError(f"a PNG holds uint8 or uint16, not {values.dtype}: write TIFF or NPY instead")
     file = bytes(cv2.imencode(".png", values)[1])
     if not text:
         return file
