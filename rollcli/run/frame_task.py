@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError
 from rollcli.estimator.estimate import RollEstimate, estimate_roll
 from rollcli.files.codecs.png import encode_png
-from rollcli.files.codecs.tiff import encode_tiff
 from rollcli.files.encodings import KITTI_TOP, Encoding, to_kitti
 from rollcli.files.formats import encode_stored
 from rollcli.files.results import Row
@@ -200,9 +199,8 @@ def encode_computed(path: str, disparity: NDArray[Any], save_as: str, text: str 
 
 def encode_heights(heights: NDArray[np.float32], save_as: str, unit: str) -> bytes:
     """Encode heights over the road as a float32 TIFF, which names their unit, or NPY."""
-    if save_as == "npy":
-        return encode_stored(heights, "npy")
-    return encode_tiff(heights, description=f"height over the road, {unit}")
+    form = "npy" if save_as == "npy" else "tiff"
+    return encode_stored(heights, form, text=f"height over the road, {unit}")
 
 
 def _require_angle(frame: Frame, options: FrameOptions) -> None:

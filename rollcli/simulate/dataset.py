@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from rollcli import __version__
 from rollcli.errors import ExitStatus, InputError, OutputError, UsageError, writing
 from rollcli.files.atomic import is_there, remove_leftovers, write_atomic
-from rollcli.files.codecs.tiff import encode_tiff
 from rollcli.files.encodings import KITTI_TOP, to_kitti
 from rollcli.files.formats import encode_stored
 from rollcli.files.locking import differences, not_resumable
@@ -209,7 +208,7 @@ def _write_frame(task: RenderTask) -> str:
     frame = render_frame(task.spec)
     data = [_png(frame.left), _png(frame.right), encode_stored(to_kitti(frame.disparity), "png")]
     if frame.heights is not None:
-        data.append(encode_tiff(frame.heights, description="height over the road, metres"))
+        data.append(encode_stored(frame.heights, "tiff", text="height over the road, metres"))
     for path, content in zip(task.files, data, strict=True):
         write_atomic(path, content)
     return task.stem
