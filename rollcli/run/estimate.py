@@ -53,21 +53,22 @@ def _run(plan: Plan, resume_command: str) -> ExitStatus:
         notes = [*plan.notes, *(calibration_notes(plan.frames) if options.calibration.given else [])]
         for note in (*notes[:_NOTES], *kept.notes()):
             progress.note(note)
+        whole = False
         try:
             with stop_on_signals() as stop, progress:
-                _run_steps(plan, output, progress, stop)
+                whole = _run_steps(plan, output, progress, stop)
         except KeyboardInterrupt:  # the second Ctrl-C: without waiting for the frames that have begun
-            progress.stopped_early = True
+            pass
         except (OutputError, WorkerError) as error:
             raise type(error)(f"{error}{output.hint()}") from error
-        if not progress.stopped_early:
+        if whole:
             output.finish(progress.summary)
         progress.tell_end()
-        if stop.asked and progress.stopped_early:
+        if stop.asked and not whole:
             how = f"; continue with: {resume_command}" if plan.files else ""
             progress.say(f"interrupted{how}")
             return ExitStatus.INTERRUPTED
-        if not (progress.stopped_early or options.running.quiet):
+        if whole and not options.running.quiet:
             calibrated = (frame.calibration for frame in plan.frames if frame.calibration is not None)
             downscale = options.stereo.downscale if options.paired else 1.0
             if note := progress.summary.pose_note(next(calibrated, None), downscale):
@@ -76,16 +77,15 @@ def _run(plan: Plan, resume_command: str) -> ExitStatus:
         return progress.summary.status
 
 
-def _run_steps(plan: Plan, output: Output, progress: Progress, stop: Stop) -> None:
-    """Do one step after the other, up to one that does not come to its end."""
-    progress.stopped_early = True
+def _run_steps(plan: Plan, output: Output, progress: Progress, stop: Stop) -> bool:
+    """Do one step after the other, up to one that does not come to its end; tell whether none is left."""
     for step in output.kept.steps():
         try:
             if not _run_step(step, plan, output, progress, stop):
-                return
+                return False
         finally:
             output.commit()
-    progress.stopped_early = False
+    return True
 
 
 def _run_step(step: Step, plan: Plan, output: Output, progress: Progress, stop: Stop) -> bool:

@@ -28,17 +28,12 @@ class Plan:
     def output(self) -> str:
         """Where the rows go."""
         output = self.options.result.output
-        return output.rstrip("/") if self.in_parts else output
+        return output.rstrip("/") if self.options.result.in_parts else output
 
     @property
     def format(self) -> Format:
         """How the rows are written."""
         return self.options.result.form
-
-    @property
-    def in_parts(self) -> bool:
-        """Whether the result is a folder of parts."""
-        return self.options.result.in_parts
 
     @property
     def files(self) -> list[str]:
@@ -62,7 +57,7 @@ def make_plan(options: EstimateOptions) -> Plan:
     if not options.paired:
         check_depth(frames, options.encoding)
     plan = Plan(options, frames)
-    if options.result.update and plan.in_parts:
+    if options.result.update and options.result.in_parts:
         raise UsageError(
             f"{plan.output}: rows of a result in parts (Parquet, or below a URL) keep their places: "
             "--update takes a result in one file of CSV or JSON Lines"

@@ -328,7 +328,6 @@ class Progress(TaskProgress):
         super().__init__(total, quiet=running.quiet, verbose=running.verbose)
         self.summary = summary or RunSummary()
         self.kept = self.summary.frames
-        self.stopped_early = False
         self._statuses = statuses
         self._auto = encoding.encoding == "auto" and encoding.scale is None
         self._failures, self._warnings = Causes(), Causes()

@@ -224,7 +224,7 @@ def open_output(plan: Plan) -> Iterator[Output]:
     OutputError
         It cannot be written.
     """
-    if plan.in_parts:
+    if plan.options.result.in_parts:
         if plan.format == "parquet":
             require_extra("parquet", "Parquet")  # before any work
         _check_parts(plan)
@@ -250,7 +250,7 @@ def kept_of(plan: Plan) -> KeptRows:
         As `open_output`.
     """
     parts = list[str]()
-    if plan.in_parts:
+    if plan.options.result.in_parts:
         parts = _check_parts(plan)
         kept, _ = _kept_parts(plan, parts)
     else:

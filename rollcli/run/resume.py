@@ -137,7 +137,7 @@ def _effective(plan: Plan) -> dict[str, Any]:
     values |= {
         "format": plan.format,
         "timing": options.result.timing,
-        **({"part-rows": options.result.part_rows} if plan.in_parts else {}),
+        **({"part-rows": options.result.part_rows} if options.result.in_parts else {}),
         "shard": "/".join(map(str, options.result.shard)),
         **({"shard-by": "range"} if options.result.shard_by == "range" else {}),
         **({"side-by-side": layout} if layout else {}),
@@ -535,7 +535,7 @@ def _differences(kept: KeptRows, was: Mapping[str, Any] | None, record: RunRecor
     if kept.mismatch:
         yield f"the inputs differ: {kept.mismatch}{hint}"
     if kept.count > len(frames):
-        how = "" if plan.in_parts else "; --update leaves out the rows of frames that are gone"
+        how = "" if plan.options.result.in_parts else "; --update leaves out the rows of frames that are gone"
         yield f"it has {kept.count} rows, and there are {len(frames)} frames{how}"
     inputs_was, inputs_now = was["inputs"], now["inputs"]
     if inputs_was.get("frames") != inputs_now["frames"]:
@@ -543,7 +543,7 @@ def _differences(kept: KeptRows, was: Mapping[str, Any] | None, record: RunRecor
     if inputs_was.get("names") != inputs_now["names"]:
         yield f"the names of the inputs differ{hint}"
     if kept.changed:
-        how = "" if plan.in_parts else "; --update does again what has changed"
+        how = "" if plan.options.result.in_parts else "; --update does again what has changed"
         yield f"{kept.changed[0]} has changed since{how}"
 
 
