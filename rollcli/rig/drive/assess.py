@@ -29,6 +29,7 @@ _FRAME = re.compile(
     r"(.*?\.(?:bag|db3|mcap|mp4|avi|mkv|mov))#(?:.*@([0-9]{1,20})(?:\.[0-9]+)?)?", re.IGNORECASE
 )
 _NS = 1e-9
+_LEAST_S = 1e-6  # from frame to frame: the stamps of a recorder that has no clock count its frames
 
 
 def drive_of(file: str) -> str:
@@ -45,11 +46,15 @@ def drive_of(file: str) -> str:
 
 
 def seconds_of(files: Sequence[str]) -> NDArray[np.float64]:
-    """Return when frames were taken, s since the first stamp, shape (N,); NaN for names without a stamp."""
+    """Return when frames were taken, s since the first stamp, shape (N,); NaN where nothing tells."""
     found = [_FRAME.match(file) if "#" in file else None for file in files]
     stamps = [None if each is None or each[2] is None else int(each[2]) for each in found]
     first = next((each for each in stamps if each is not None), 0)
-    return np.array([np.nan if each is None else (each - first) * _NS for each in stamps])
+    seconds = np.array([np.nan if each is None else (each - first) * _NS for each in stamps])
+    known = seconds[np.isfinite(seconds)]
+    if known.size and np.ptp(known) < _LEAST_S * known.size:
+        seconds[:] = np.nan
+    return seconds
 
 
 def split_drives(
