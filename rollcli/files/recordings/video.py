@@ -37,6 +37,7 @@ _OPTIONS_NAME = "OPENCV_FFMPEG_CAPTURE_OPTIONS"
 # a packet that is cut off makes no frame, and what a file names elsewhere is not followed
 _OPTIONS = "fflags;discardcorrupt|protocol_whitelist;file"
 _PACKETS = [cv2.CAP_PROP_FORMAT, -1]  # OpenCV hands them out as they are
+_TRIES = 10_000  # packets in a row that give no frame; at the end of a file they take 4 ms
 _ALL_THREADS, _ONE_THREAD = ([cv2.CAP_PROP_N_THREADS, each] for each in (os.cpu_count() or 1, 1))
 
 
@@ -150,8 +151,8 @@ class _Decoder:
             require_decoded_fits(self.width, self.height, 3, size)
 
     def grab(self) -> bool:
-        """Decode the next frame; return whether there is one."""
-        found = bool(self._capture.grab())
+        """Decode the next frame, behind damaged packets too; return whether there is one."""
+        found = any(self._capture.grab() for _ in range(_TRIES))
         self._next += found
         return found
 

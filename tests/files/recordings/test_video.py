@@ -39,6 +39,11 @@ def write_video(path, frames, codec=None):
     return path
 
 
+def packets_of(path):
+    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_FORMAT, -1])
+    return [capture.retrieve()[1].tobytes() for _ in iter(capture.grab, False)]
+
+
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory):
     """A folder with left/ and right/, the rows of these pairs, and the views."""
@@ -151,11 +156,8 @@ def test_a_video_that_is_cut_gives_every_whole_frame_and_a_line(tmp_path, drive,
     _, _, views = drive
     path = write_video(tmp_path / name, beside(views), "MJPG")
     whole = rows(rollcli("estimate", name, "--side-by-side", cwd=tmp_path).out)
-    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_FORMAT, -1])
-    packets = [capture.retrieve()[1].tobytes() for _ in iter(capture.grab, False)]
-    capture.release()
     data = path.read_bytes()
-    ends = [data.index(packet.rstrip(b"\0")) + len(packet) for packet in packets]
+    ends = [data.index(packet.rstrip(b"\0")) + len(packet) for packet in packets_of(path)]
     for tenth in range(1, 10):
         cut = len(data) * tenth // 10
         path.write_bytes(data[:cut])
@@ -212,16 +214,20 @@ def test_a_pair_of_videos_of_which_one_is_cut_off_uses_what_both_have(tmp_path, 
 
 
 def test_an_interrupted_run_over_a_video_is_resumed_to_the_same_bytes(tmp_path, drive):
-    write_video(tmp_path / "drive.mkv", beside(drive[2]))
+    path = write_video(tmp_path / "drive.mkv", beside(drive[2]), "MJPG")
+    damaged = packets_of(path)[1].rstrip(b"\0")  # gives no frame: one behind it takes its number
+    path.write_bytes(path.read_bytes().replace(damaged, bytes(len(damaged))))
     given = ["estimate", "drive.mkv", "--side-by-side", "-o", "rolls.csv"]
-    assert rollcli(*given, "-j", "1", cwd=tmp_path).status == 0
+    assert rollcli(*given, "-j", "1", cwd=tmp_path).status == 3
+    failed = [row["status"] == "error" for row in rows((tmp_path / "rolls.csv").read_text())]
+    assert failed == [False] * (COUNT - 1) + [True]
     inputs = (tmp_path / "rolls.csv.inputs").read_bytes()
     whole = keep_rows(tmp_path / "rolls.csv", 2)
     refusal = rollcli(
         "estimate", "drive.mkv", "--side-by-side", "top-bottom", *given[3:], "--resume", cwd=tmp_path
     ).refused()
     assert "side-by-side" in refusal
-    assert rollcli(*given, "--resume", "-j", "3", cwd=tmp_path).status == 0
+    assert rollcli(*given, "--resume", "-j", "3", cwd=tmp_path).status == 3
     assert (tmp_path / "rolls.csv").read_bytes() == whole
     assert (tmp_path / "rolls.csv.inputs").read_bytes() == inputs
 
