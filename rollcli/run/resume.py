@@ -36,6 +36,7 @@ from rollcli.run.options import (
 from rollcli.run.plan import Plan
 from rollcli.run.progress import RunSummary
 from rollcli.run.result_file import Inputs, data_of
+from rollcli.stereo.correction import Correction, read_correction
 from rollcli.stereo.options import StereoOptions
 
 
@@ -80,9 +81,13 @@ class RunRecord:
     @cached_property
     def fixed(self) -> dict[str, Any]:
         """What was fixed before the run; made when asked for, since that takes all frames."""
-        plan = self.plan
+        plan, options = self.plan, self.plan.options
         fixed = {"rollcli": __version__, "options": _effective(plan), "inputs": names_of(plan.frames)}
-        return fixed | ({"calibration": _calibrations(plan.frames)} if plan.options.calibration.given else {})
+        if options.calibration.given:
+            fixed["calibration"] = _calibrations(plan.frames)
+        if options.paired and options.stereo.checks_alignment:  # its file may be written anew
+            fixed["correction"] = _digest(read_correction(str(options.stereo.align)))
+        return fixed
 
     def check_owned(self) -> None:
         """Check that no other run has begun since; see `batch.check_owned`."""
@@ -159,12 +164,15 @@ def _by_name(options: Options) -> dict[str, Any]:
 def _calibrations(frames: Sequence[Frame]) -> dict[str, Any]:
     """List the first few calibrations used, and where they are from; count how many differ."""
     used = dict.fromkeys(frame.calibration for frame in frames if frame.calibration is not None)
-    digest = hashlib.sha256("\n".join(map(repr, used)).encode("utf-8", "surrogateescape"))
     return {
         "different": len(used),
-        "sha256": digest.hexdigest(),
+        "sha256": _digest(*used),
         "first": [asdict(calibration) for calibration in islice(used, _CALIBRATIONS_LISTED)],
     }
+
+
+def _digest(*values: Calibration | Correction) -> str:
+    return hashlib.sha256("\n".join(map(repr, values)).encode("utf-8", "surrogateescape")).hexdigest()
 
 
 _CALIBRATIONS_LISTED = 3
@@ -522,6 +530,8 @@ def _differences(kept: KeptRows, was: Mapping[str, Any] | None, record: RunRecor
         yield f"{base_name(results.run_path(plan.output))} is damaged"
         return
     yield from differences(was, now)
+    if was.get("correction") != now.get("correction"):
+        yield f"--align {plan.options.stereo.align} has changed since"
     if plan.options.result.update:
         return
     frames, count = plan.frames, was["inputs"].get("frames")
