@@ -44,11 +44,13 @@ class Stored:
 
 
 def require_map_shape(shape: tuple[int, ...]) -> None:
-    """Refuse anything that is not (H, W)."""
+    """Refuse anything that is not (H, W) with at least one pixel."""
     if len(shape) != 2:
         colours = len(shape) == 3 and shape[2] in (3, 4)
         hint = "; photographs are given as image files, by --left and --right" if colours else ""
         raise InputError(f"is a {len(shape)}-D array of shape {shape}; a disparity map is 2-D (H, W){hint}")
+    if 0 in shape:
+        raise InputError(f"has no pixels (shape {shape})")
 
 
 def require_bytes(what: str, needed: int, there: int) -> None:
