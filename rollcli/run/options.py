@@ -448,7 +448,7 @@ class FramesOptions:
         """What a worker is told of the frames."""
         told = FrameOptions(
             self.encoding,
-            self.stereo,
+            replace(self.stereo, align=self.stereo.correction or self.stereo.align),
             self.region,
             side_by_side=self.pairs.side_by_side,
             root=self.running.root,

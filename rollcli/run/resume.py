@@ -36,7 +36,7 @@ from rollcli.run.options import (
 from rollcli.run.plan import Plan
 from rollcli.run.progress import RunSummary
 from rollcli.run.result_file import Inputs, data_of
-from rollcli.stereo.correction import Correction, read_correction
+from rollcli.stereo.correction import Correction
 from rollcli.stereo.options import StereoOptions
 
 
@@ -85,8 +85,8 @@ class RunRecord:
         fixed = {"rollcli": __version__, "options": _effective(plan), "inputs": names_of(plan.frames)}
         if options.calibration.given:
             fixed["calibration"] = _calibrations(plan.frames)
-        if options.paired and options.stereo.checks_alignment:  # its file may be written anew
-            fixed["correction"] = _digest(read_correction(str(options.stereo.align)))
+        if options.paired and (correction := options.stereo.correction) is not None:
+            fixed["correction"] = _digest(correction)  # its file may be written anew
         return fixed
 
     def check_owned(self) -> None:

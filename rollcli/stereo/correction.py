@@ -3,7 +3,6 @@
 import json
 import math
 from dataclasses import astuple, replace
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 from rollcli.errors import UsageError, as_usage, reading
@@ -88,7 +87,6 @@ class Correction(NamedTuple):
         return replace(self.lies, offset=self.lies.offset + share * (offset - self.lies.offset))
 
 
-@lru_cache(maxsize=8)
 def read_correction(path: str) -> Correction:
     """Read what `rollcli rig --correction` wrote.
 

@@ -188,7 +188,7 @@ def compute_disparity(
     speckle_size: int = _DEFAULT.speckle_size,
     speckle_range: int = _DEFAULT.speckle_range,
     downscale: float = _DEFAULT.downscale,
-    align: str | os.PathLike[str] = _DEFAULT.align,
+    align: str | os.PathLike[str] = "auto",
     vertical_offset: float | None = _DEFAULT.vertical_offset,
 ) -> Map:
     """Return the disparity map of a rectified pair.

@@ -66,7 +66,7 @@ class StereoOptions:
     speckle_size: int = 100
     speckle_range: int = 2
     downscale: float = 1.0
-    align: str | os.PathLike[str] = "auto"
+    align: str | os.PathLike[str] | Correction = "auto"
     vertical_offset: float | None = None
 
     def __post_init__(self) -> None:
@@ -82,8 +82,20 @@ class StereoOptions:
             raise UsageError(f"block-size {self.block_size}: must be odd")
         if self.mode not in MODES:
             raise UsageError(f"sgbm-mode {self.mode!r}: choose one of {', '.join(MODES)}")
-        if self.align not in ALIGN:
-            read_correction(str(self.align))
+        _ = self.correction  # refuses what is none
+
+    @property
+    def correction(self) -> Correction | None:
+        """What the file that `align` names says, or what was read of it before; None where it names none.
+
+        Raises
+        ------
+        UsageError
+            It cannot be read, or is no correction.
+        """
+        if isinstance(self.align, Correction):
+            return self.align
+        return None if self.align in ALIGN else read_correction(str(self.align))
 
     def given_alignment(self, width: int, height: int) -> Correction:
         """Return how the right view lies as the user says, of views of this size.
@@ -93,9 +105,9 @@ class StereoOptions:
         UsageError
             The user says it of views of another shape.
         """
-        if self.vertical_offset is not None or self.align in ALIGN:
+        if self.vertical_offset is not None or (given := self.correction) is None:
             return Correction(Misalignment(float(self.vertical_offset or 0)), None, 0.0, width, height)
-        return read_correction(str(self.align)).resized(width, height)
+        return given.resized(width, height)
 
     @property
     def is_default(self) -> bool:

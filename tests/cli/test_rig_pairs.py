@@ -126,8 +126,7 @@ def test_a_drive_tells_a_pitch_from_a_shift_and_levels_its_rows(pairs):
 
 def test_the_matrix_brings_the_right_view_back(pairs):
     found = json.loads((pairs / "use.json").read_text())
-    x, y = -479 / 2, -359 / 2
-    turned = math.radians(0.15)
+    x, y, turned = -479 / 2, -359 / 2, math.radians(0.15)
     expected = [1.003 * x - turned * y - x, turned * x + 1.003 * y + 1.2 - y]
     assert (np.array(found["matrix"]) @ [0.0, 0.0, 1.0])[:2] == pytest.approx(expected, abs=0.15)
 
@@ -146,8 +145,7 @@ def test_the_matrix_enlarges_columns_as_is_believed_and_keeps_that_of_the_princi
 
 def test_a_pair_that_contradicts_the_correction_is_suspect(pairs):
     first = ("--left", "left/frame_000[12].png", "--right", "right/frame_000[12].png")
-    done = rollcli("estimate", *first, "--align", "use.json", cwd=pairs)
-    rows = rows_of(done.out)
+    rows = rows_of(rollcli("estimate", *first, "--align", "use.json", cwd=pairs).out)
     assert [row["status"] for row in rows] == ["suspect"] * 2
     assert all("do not lie as the correction says" in row["message"] for row in rows)
 

@@ -15,6 +15,7 @@ import pytest
 
 from rollcli import __version__
 from rollcli.errors import UsageError
+from rollcli.files.results import ALIGNMENT_COLUMNS
 from rollcli.files.storage import list_names
 from rollcli.run.workers import cluster
 from rollcli.run.workers.cluster import check_scheduler, probe, scheduler_address
@@ -170,11 +171,13 @@ def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_a_local_run(local, far
 def test_conversions_on_a_cluster_give_the_bytes_of_a_local_run(tmp_path, scheduler, workers):
     write_maps(tmp_path / "maps", 3)
     write_pair(tmp_path, "a.png", road_map(width=160, height=80) / 2)
+    lay = {**dict.fromkeys(ALIGNMENT_COLUMNS, 0), "width": 160, "height": 80}
+    (tmp_path / "lay.json").write_text(json.dumps(lay))  # which workers do not see by this name
     (tmp_path / "maps" / "frame1.png").write_bytes(b"no map")
     lines = {
         "derotate": ("maps", "--roll", "2"),
         "vdisparity": ("maps", "--counts"),
-        "disparity": ("--left", "left", "--right", "right", "--num-disparities", "32"),
+        "disparity": ("--left", "left", "--right", "right", "--num-disparities", "32", "--align", "lay.json"),
     }
     for name, arguments in lines.items():
         status = 0 if name == "disparity" else 3
