@@ -11,6 +11,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError, about, as_usage
+from rollcli.files.bounded import state_of
 from rollcli.files.naming import Input, listed, natural_key, split_position
 from rollcli.files.recordings import messages
 from rollcli.files.recordings.bags import Topic, opened
@@ -186,7 +187,7 @@ def read_frame(path: str, member: str, name: str) -> bytes | NDArray[Any]:
         raise InputError(f"{name}: no such topic in {path}")
     searched = not place
     if searched:
-        place = _index(path, topic_name).get(stamp, ())
+        place = _index(*state_of(path), topic_name).get(stamp, ())
     if not place:
         raise InputError(f"{name}: no such frame in {path}")
     data, raw_of = bag.read(place[:2]).data, None
@@ -199,7 +200,7 @@ def read_frame(path: str, member: str, name: str) -> bytes | NDArray[Any]:
 
 
 @lru_cache(maxsize=2)  # for names without a place, such as those of a result that is drawn
-def _index(path: str, topic: str) -> dict[str, tuple[int, ...]]:
+def _index(path: str, size: int, modified_ns: int, process: int, topic: str) -> dict[str, tuple[int, ...]]:
     topics = _topics([path])
     found = _scan([path], [topics[topic]], topics)
     frames, info = found.frames[topic], found.cameras.get(_beside(topic))

@@ -425,4 +425,8 @@ def test_a_raw_view_that_is_read_by_its_name_is_rectified(tmp_path):
     name = f"{write_bag(tmp_path, 'raw', 'mcap', make)}#/l/image_raw@{START}"
     seen = np.array(k).reshape(3, 3), np.array(d), np.eye(3), np.array(P).reshape(3, 4)[:, :3]
     where = cv2.initUndistortRectifyMap(*seen, (160, 120), cv2.CV_32FC1)
-    np.testing.assert_array_equal(read_image(name, name), cv2.remap(view, *where, cv2.INTER_LINEAR))
+    expected = cv2.remap(view, *where, cv2.INTER_LINEAR)
+    np.testing.assert_array_equal(read_image(name, name), expected)
+    # recorded anew under the same name, in another order
+    write_bag(tmp_path, "b", "mcap", lambda store: [*make(store)][::-1]).rename(tmp_path / "raw.mcap")
+    np.testing.assert_array_equal(read_image(name, name), expected)

@@ -153,8 +153,7 @@ def test_the_correction_of_views_side_by_side_is_that_of_their_files(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["drive.avi", "drive.mkv"])
 def test_a_video_that_is_cut_gives_every_whole_frame_and_a_line(tmp_path, drive, name):
-    _, _, views = drive
-    path = write_video(tmp_path / name, beside(views), "MJPG")
+    path = write_video(tmp_path / name, beside(drive[2]), "MJPG")
     whole = rows(rollcli("estimate", name, "--side-by-side", cwd=tmp_path).out)
     data = path.read_bytes()
     ends = [data.index(packet.rstrip(b"\0")) + len(packet) for packet in packets_of(path)]
@@ -200,9 +199,8 @@ def test_a_video_that_was_cut_by_its_edit_list_has_the_frames_that_it_shows(tmp_
 
 
 def test_a_pair_of_videos_of_which_one_is_cut_off_uses_what_both_have(tmp_path, drive):
-    _, _, views = drive
     for side, name in enumerate(("a.avi", "b.avi")):
-        write_video(tmp_path / name, [each[side] for each in views], "FFV1")
+        write_video(tmp_path / name, [each[side] for each in drive[2]], "FFV1")
     whole = rows(rollcli("estimate", "--left", "a.avi", "--right", "b.avi", cwd=tmp_path).out)
     data = (tmp_path / "b.avi").read_bytes()
     (tmp_path / "b.avi").write_bytes(data[: len(data) * 7 // 10])
@@ -375,8 +373,7 @@ def test_frames_of_a_video_are_read_in_any_order_and_others_are_errors(tmp_path,
     _, _, views = drive
     write_video(tmp_path / "drive.mkv", beside(views))
     for number in (3, 0, 0, 4):
-        image = read_image(tmp_path / f"drive.mkv#{number:06d}")
-        np.testing.assert_array_equal(image, beside(views)[number])
+        np.testing.assert_array_equal(read_image(tmp_path / f"drive.mkv#{number:06d}"), beside(views)[number])
     names = [f"drive.mkv#{each}" for each in ("000001", "000099", "one", "rest")]
     done = rollcli("estimate", *names, "--side-by-side", cwd=tmp_path)
     assert (done.status, {row["file"]: row["message"] for row in rows(done.out)}) == (
