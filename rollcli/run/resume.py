@@ -24,7 +24,7 @@ from rollcli.files.stores.locations import base_name, public_name
 from rollcli.rig.calibration import Calibration
 from rollcli.run import outputs
 from rollcli.run.batch import Batch, Parts, Step, check_owned
-from rollcli.run.frame import Frame, ReadAs
+from rollcli.run.frame import Frame, ReadAs, located_beside
 from rollcli.run.options import (
     EncodingOptions,
     FrameOptions,
@@ -37,7 +37,7 @@ from rollcli.run.plan import Plan
 from rollcli.run.progress import RunSummary
 from rollcli.run.result_file import Inputs, data_of
 from rollcli.stereo.correction import Correction
-from rollcli.stereo.options import StereoOptions
+from rollcli.stereo.options import ALIGN, StereoOptions
 
 
 def names_of(frames: Sequence[Frame]) -> dict[str, Any]:
@@ -203,7 +203,7 @@ def recorded_options(run: Mapping[str, Any] | None, name: str) -> FrameOptions:
     run : mapping or None
         The content of FILE.run.json.
     name : str
-        What errors call it.
+        Where it lies, which is beside what it names, and what errors call it.
 
     Raises
     ------
@@ -213,7 +213,9 @@ def recorded_options(run: Mapping[str, Any] | None, name: str) -> FrameOptions:
     given = (run or {}).get("options", {})
     if not isinstance(given, Mapping):
         raise InputError(f"{name}: is not the record of a run: its options are no table")
-    layout = given.get("side-by-side")
+    layout, align = given.get("side-by-side"), given.get("align")
+    if isinstance(align, str) and align not in ALIGN:
+        given = {**given, "align": located_beside(align, name)}
     try:
         if layout not in (None, *get_args(Layout)):
             raise TypeError(f"side-by-side is {layout!r}")

@@ -101,6 +101,7 @@ def test_with_a_correction_the_angles_are_those_of_the_untouched_pairs(pairs):
     apart = np.abs(rolls(pairs / "corrected.csv") - rolls(pairs / "level.csv"))
     assert np.median(apart) <= 0.02
     assert apart.max() <= 0.08
+    assert rollcli("rig", "../corrected.csv", "--correction", "../new.json", cwd=pairs / "off").status == 0
     assert rollcli("rig", "level.csv", "--correction", "again.json", "--overwrite", cwd=pairs).status == 0
     for how in ("--resume", "--update"):
         assert "--align again.json has changed" in rollcli("estimate", *given, how, cwd=pairs).refused()

@@ -256,8 +256,7 @@ def test_a_result_of_a_video_goes_on_to_the_other_commands(tmp_path, drive):
 
 
 def test_what_is_no_usable_video_is_told_in_a_line(tmp_path, drive):
-    _, _, views = drive
-    frames = beside(views)
+    frames = beside(drive[2])
     write_video(tmp_path / "drive.mkv", frames)
     odd = write_video(tmp_path / "odd.avi", frames, "png ")  # the writer makes widths even
     smaller = cv2.imencode(".png", frames[0][:, :101])[1].tobytes()
@@ -370,10 +369,10 @@ def test_lengths_that_a_video_says_in_other_ways_say_the_same(tmp_path, name, co
 
 
 def test_frames_of_a_video_are_read_in_any_order_and_others_are_errors(tmp_path, drive):
-    _, _, views = drive
-    write_video(tmp_path / "drive.mkv", beside(views))
+    views = beside(drive[2])
+    write_video(tmp_path / "drive.mkv", views)
     for number in (3, 0, 0, 4):
-        np.testing.assert_array_equal(read_image(tmp_path / f"drive.mkv#{number:06d}"), beside(views)[number])
+        np.testing.assert_array_equal(read_image(tmp_path / f"drive.mkv#{number:06d}"), views[number])
     names = [f"drive.mkv#{each}" for each in ("000001", "000099", "one", "rest")]
     done = rollcli("estimate", *names, "--side-by-side", cwd=tmp_path)
     assert (done.status, {row["file"]: row["message"] for row in rows(done.out)}) == (
