@@ -24,7 +24,7 @@ from rollcli.files.stores.locations import base_name, public_name
 from rollcli.rig.calibration import Calibration
 from rollcli.run import outputs
 from rollcli.run.batch import Batch, Parts, Step, check_owned
-from rollcli.run.frame import Frame, ReadAs, located_beside
+from rollcli.run.frame import Frame, ReadAs
 from rollcli.run.options import (
     EncodingOptions,
     FrameOptions,
@@ -37,7 +37,7 @@ from rollcli.run.plan import Plan
 from rollcli.run.progress import RunSummary
 from rollcli.run.result_file import Inputs, data_of
 from rollcli.stereo.correction import Correction
-from rollcli.stereo.options import ALIGN, StereoOptions
+from rollcli.stereo.options import StereoOptions
 
 
 def names_of(frames: Sequence[Frame]) -> dict[str, Any]:
@@ -86,7 +86,7 @@ class RunRecord:
         if options.calibration.given:
             fixed["calibration"] = _calibrations(plan.frames)
         if options.paired and (correction := options.stereo.correction) is not None:
-            fixed["correction"] = _digest(correction)  # its file may be written anew
+            fixed["correction"] = correction.as_record()  # its file may be written anew
         return fixed
 
     def check_owned(self) -> None:
@@ -164,15 +164,12 @@ def _by_name(options: Options) -> dict[str, Any]:
 def _calibrations(frames: Sequence[Frame]) -> dict[str, Any]:
     """List the first few calibrations used, and where they are from; count how many differ."""
     used = dict.fromkeys(frame.calibration for frame in frames if frame.calibration is not None)
+    digest = hashlib.sha256("\n".join(map(repr, used)).encode("utf-8", "surrogateescape"))
     return {
         "different": len(used),
-        "sha256": _digest(*used),
+        "sha256": digest.hexdigest(),
         "first": [asdict(calibration) for calibration in islice(used, _CALIBRATIONS_LISTED)],
     }
-
-
-def _digest(*values: Calibration | Correction) -> str:
-    return hashlib.sha256("\n".join(map(repr, values)).encode("utf-8", "surrogateescape")).hexdigest()
 
 
 _CALIBRATIONS_LISTED = 3
@@ -203,7 +200,7 @@ def recorded_options(run: Mapping[str, Any] | None, name: str) -> FrameOptions:
     run : mapping or None
         The content of FILE.run.json.
     name : str
-        Where it lies, which is beside what it names, and what errors call it.
+        What errors call it.
 
     Raises
     ------
@@ -213,21 +210,24 @@ def recorded_options(run: Mapping[str, Any] | None, name: str) -> FrameOptions:
     given = (run or {}).get("options", {})
     if not isinstance(given, Mapping):
         raise InputError(f"{name}: is not the record of a run: its options are no table")
-    layout, align = given.get("side-by-side"), given.get("align")
-    if isinstance(align, str) and align not in ALIGN:
-        given = {**given, "align": located_beside(align, name)}
+    layout, correction = given.get("side-by-side"), (run or {}).get("correction")
     try:
         if layout not in (None, *get_args(Layout)):
             raise TypeError(f"side-by-side is {layout!r}")
+        if correction is None:
+            stereo = _filled(StereoOptions(), given)
+        else:  # whose file may lie elsewhere by now, or hold another one
+            stereo = _filled(StereoOptions(), {**given, "align": "auto"})
+            stereo = replace(stereo, align=Correction.of_record(correction))
         return FrameOptions(
             encoding=_filled(EncodingOptions(), given),
             method=_filled(MethodOptions(), given),
-            stereo=_filled(StereoOptions(), given),
+            stereo=stereo,
             region=_region(given),
             images=_filled(ImageOptions(), given),
             side_by_side=layout,
         )
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, KeyError) as error:
         raise InputError(f"{name}: is not the record of a run: {error}") from error
 
 

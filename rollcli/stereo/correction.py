@@ -2,7 +2,8 @@
 
 import json
 import math
-from dataclasses import astuple, replace
+from collections.abc import Mapping
+from dataclasses import asdict, astuple, replace
 from typing import Any, NamedTuple
 
 from rollcli.errors import UsageError, as_usage, reading
@@ -60,6 +61,20 @@ class Correction(NamedTuple):
     offset_error: float
     width: int
     height: int
+
+    def as_record(self) -> dict[str, Any]:
+        """Return it as JSON holds it: what `of_record` reads."""
+        columns = self.columns and asdict(self.columns)
+        error = self.offset_error if math.isfinite(self.offset_error) else None
+        return {**self._asdict(), "lies": asdict(self.lies), "columns": columns, "offset_error": error}
+
+    @staticmethod
+    def of_record(record: Mapping[str, Any]) -> "Correction":
+        """Read it back; `TypeError` or `KeyError` where it is none."""
+        columns, error = record["columns"], record["offset_error"]
+        lies, columns = Misalignment(**record["lies"]), columns and ColumnSupport(**columns)
+        error = math.inf if error is None else float(error)
+        return Correction(lies, columns, error, int(record["width"]), int(record["height"]))
 
     def resized(self, width: int, height: int) -> "Correction":
         """Return the same of views of another size, whose sides are rounded to whole pixels.
