@@ -77,8 +77,6 @@ def _size(shape: tuple[int, ...]) -> str:
     return "x".join(map(str, reversed(shape)))
 
 
-# when more of the map than this lies at the end of the searched range, the range was too short
-_MUCH_AT_END = 0.05
 _LACKS_ROAD = "matched over the whole range, as too little road was found to match along"
 
 
@@ -319,13 +317,13 @@ def matched_source(
     left: NDArray[Any], right: NDArray[Any], options: StereoOptions, find_road: "FindRoad | None"
 ) -> Source:
     """Match a pair for the estimate; see `match_pair`."""
-    from rollcli.stereo.match import match_pair
+    from rollcli.stereo.match import MUCH_AT_END, match_pair
 
     match = match_pair(left, right, options, find_road)
     searched = (match.min_disparity, match.min_disparity + match.num_disparities - 1)
     height, width = left.shape[:2]
     at_end = f"{match.end_fraction:.0%} of the map lies at the end of the searched range"
-    short = f"{at_end}; use a larger --num-disparities" if match.end_fraction > _MUCH_AT_END else ""
+    short = f"{at_end}; use a larger --num-disparities" if match.end_fraction > MUCH_AT_END else ""
     alignment = {}
     if match.lies is not None:  # rounded: a resumed run reads them from its rows
         lies = zip(ALIGNMENT_COLUMNS, match.lies.values(*match.disparity.shape), strict=True)

@@ -103,6 +103,7 @@ _OPEN_COLUMNS = 0.001
 # The same of a pitch alone, which an offset of a few pixels may be: 0.1 degrees (95 %). Offsets of less than
 # 2 px, as calibrated rigs have, leave a third of it
 _OPEN_PITCH = 0.0003
+MUCH_AT_END = 0.05  # share of a map; with more at the end of the searched range, that was too short
 _FURTHEST = 12.0, 0.03, 0.02  # offset, rotation and scale that no rig in use has: px, radians, share
 # the doubts of a pair: its correction was still changing when it was given up, or could not be checked; its
 # columns may be far from where they are believed to be; it is not level once it was levelled as a file says
@@ -241,7 +242,11 @@ def compute_disparity(
 
 
 def match_pair(
-    left: NDArray[Any], right: NDArray[Any], options: StereoOptions, find_road: FindRoad | None = None
+    left: NDArray[Any],
+    right: NDArray[Any],
+    options: StereoOptions,
+    find_road: FindRoad | None = None,
+    at_least: int = 0,
 ) -> StereoMatch:
     """Match a rectified pair, and keep all that was found on the way.
 
@@ -252,6 +257,8 @@ def match_pair(
     find_road : callable, optional
         Finds the road's plane in a smaller map of the pair. The road is then matched along it, and what lies
         beside and above it at a third of the size; without it all is matched at full size.
+    at_least : int
+        Disparities to search, where `options` leave that to the program.
 
     Raises
     ------
@@ -271,7 +278,7 @@ def match_pair(
         look = look_for_range((views[0], level(views[1], told.lies)))
     count = options.num_disparities
     if count is None:
-        count = (width // 8 if look.range is None else look.range) - first
+        count = max(at_least, (width // 8 if look.range is None else look.range) - first)
     count = usable_range(count, first, width, options.block_size)
 
     blank, find_road = shows_nothing(views[0]), find_road if first >= 0 else None
@@ -319,11 +326,14 @@ def match_pair(
     valid, at_end = cv2.countNonZero(matched), matched >= first + count - 2
     if pair.road is not None:  # what is matched along the road's plane, no range ends
         at_end[pair.top :] &= matched[pair.top :] != pair.road.disparity
+    end_fraction = np.count_nonzero(at_end) / valid if valid else 0.0
+    if end_fraction > MUCH_AT_END and options.num_disparities is None and not at_least:
+        return match_pair(left, right, options, find_road, 2 * count)  # the first look has seen too little
     return StereoMatch(
         disparity=disparity,
         min_disparity=first,
         num_disparities=count,
-        end_fraction=np.count_nonzero(at_end) / valid if valid else 0.0,
+        end_fraction=end_fraction,
         corrected=corrected,
         larger=support.scale,
         measured=measured,
