@@ -234,7 +234,7 @@ class Search:
                     if self._reads(entry.name):
                         yield path, relative
                     elif self.recursive and is_archive(path):
-                        yield from ((each, f"{relative}/{below}") for each, below in self._in_archive(path))
+                        yield from self._in_archive_found(path, relative)
                     else:
                         self.left_out[Path(entry.name).suffix.lower()] += 1
             opened = []
@@ -252,6 +252,15 @@ class Search:
             else:
                 self.left_out[posixpath.splitext(name)[1].lower()] += 1
 
+    def _in_archive_found(self, path: str, below: str) -> Iterator[tuple[str, str]]:
+        """Yield the members of one of several archives; of maps a damaged one itself, to be an error."""
+        try:
+            yield from ((each, f"{below}/{name}") for each, name in self._in_archive(path))
+        except UsageError:
+            if not self.maps:  # without its members, others would have no partner
+                raise
+            yield path, below
+
     def _in_pattern(self, pattern: str) -> Iterator[tuple[str, str]]:
         """Yield the files that match; unless the pattern names an ending, only readable ones."""
         ending = Path(pattern).suffix
@@ -265,7 +274,7 @@ class Search:
             if wanted and self._skip.isdisjoint(inside) and stat.S_ISREG(mode_of(match, _UNSEEN)):
                 below = "/".join(part for part in relative.parts if part != "..")  # outputs stay below
                 if is_archive(match):
-                    yield from ((each, f"{below}/{name}") for each, name in self._in_archive(str(path)))
+                    yield from self._in_archive_found(str(path), below)
                 else:
                     yield str(path), below
 

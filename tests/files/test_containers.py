@@ -50,8 +50,7 @@ def test_members_that_would_fill_memory_and_packed_archives_are_refused(tmp_path
 def test_a_file_may_have_a_number_sign_in_its_name(tmp_path):
     path = tmp_path / "a.zip#b.png"
     path.write_bytes(b"itself")
-    assert read_bytes(path) == b"itself"
-    assert file_of(str(path)) == str(path)
+    assert (read_bytes(path), file_of(str(path))) == (b"itself", str(path))
     assert shown("run.tar#a.png#@512+9") == "run.tar#a.png"
 
 
@@ -59,22 +58,22 @@ def test_an_image_on_stdin_is_told_what_a_dash_means(tmp_path):
     write_maps(tmp_path / "maps", 1)
     data = (tmp_path / "maps/frame0.png").read_bytes()
     done = ended(command("estimate", "-"), tmp_path, input=data, text=False)
-    assert done.returncode == 2
-    assert b"-: stands for a list of files on stdin" in done.stderr
+    assert (done.returncode, b"-: stands for a list of files on stdin" in done.stderr) == (2, True)
 
 
 def test_a_tar_gives_what_unpacking_it_would(tmp_path):
-    for number in range(2):
-        write_kitti(tmp_path / f"{number}.png", road_map(0.1 * number))
     with tarfile.open(tmp_path / "x.tar", "w") as file:
         for number in range(2):
+            write_kitti(tmp_path / f"{number}.png", road_map(0.1 * number))
             file.add(tmp_path / f"{number}.png", "a.png")
         for name, target in {"b.png": "a.png", "c.png": "a.png", "d.png": "c.png"}.items():
             link = tarfile.TarInfo(name)
             link.type = tarfile.LNKTYPE if name == "b.png" else tarfile.SYMTYPE
             link.linkname = target
             file.addfile(link)
-    found = rows_of(rollcli("estimate", "x.tar", cwd=tmp_path).out)
+    (tmp_path / "y.tar").write_bytes((tmp_path / "x.tar").read_bytes()[:1000])
+    *found, damaged = rows_of(rollcli("estimate", "*.tar", cwd=tmp_path).out)
+    assert (damaged["file"], damaged["message"]) == ("y.tar", "is a damaged archive")
     assert [row["file"] for row in found] == [f"x.tar#{name}.png" for name in "abcd"]
     assert {row["roll_deg"] for row in found} == {found[0]["roll_deg"]}
     assert float(found[0]["roll_deg"]) == pytest.approx(math.degrees(0.1), abs=0.05)
