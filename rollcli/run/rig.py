@@ -14,7 +14,7 @@ from rollcli.files.naming import listed, natural_key
 from rollcli.files.storage import STREAM, is_stream, write_output
 from rollcli.files.stores.locations import base_name, is_remote
 from rollcli.messages import say
-from rollcli.rig.drive.assess import RigAssessment, RigFrames, assess_frames, difference, doubled, short_names
+from rollcli.rig.drive.assess import RigAssessment, RigFrames, assess_frames, difference, short_names
 from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.quantities import ALIGNMENT, COLUMNS, QUANTITIES, ROLL
 from rollcli.rig.words import findings
@@ -74,7 +74,7 @@ Part = results.Result | results.ResultColumns  # one of several that are put tog
 
 
 def require_rows(parts: Sequence[Part], purpose: str) -> None:
-    """Refuse results without rows, and with several of one frame; of several shards some may have none.
+    """Refuse results without rows; of several shards some may have none, as of few frames.
 
     Raises
     ------
@@ -84,8 +84,6 @@ def require_rows(parts: Sequence[Part], purpose: str) -> None:
     for part in parts:
         if not (part.files or (some and _shard(part) not in (None, (1, 1)))):
             raise InputError(f"{part.path}: has no rows: there is nothing to {purpose}")
-        if (file := doubled(part.files)) is not None:
-            raise InputError(f"{part.path}: has several rows of {file}: keep one, or give one file a run")
 
 
 def order_of(parts: Sequence[Part]) -> tuple[NDArray[np.intp], list[str]]:
@@ -193,13 +191,16 @@ def unfinished(parts: Sequence[Part]) -> str:
 
 
 def _notes(parts: Sequence[results.ResultColumns]) -> list[str]:
+    more = {part.path: len(part.files) - len(set(part.files)) for part in parts}
+    notes = [
+        f"{path}: has several rows of a frame, {n:,} too many: each counts" for path, n in more.items() if n
+    ]
     encodings = [(part.run or {}).get("encoding") for part in parts]
     seen = sorted({str(name) for names in encodings if isinstance(names, list) for name in names})
-    if len(seen) < 2:
-        return []
-    return [
-        f"{listed(part.path for part in parts)}: maps were read as {', '.join(seen)}: are they one rig's?"
-    ]
+    if len(seen) > 1:
+        paths = listed(part.path for part in parts)
+        notes.append(f"{paths}: maps were read as {', '.join(seen)}: are they one rig's?")
+    return notes
 
 
 def run_rig(options: RigOptions) -> int:

@@ -65,7 +65,6 @@ def folder(tmp_path_factory):
     rows = [Row("maps/a.png", status="ok", roll_deg=1.0), Row("maps/b.png", status="suspect", roll_deg=2.0)]
     text = format_header("csv") + b"".join(format_row(row, "csv") for row in rows)
     (folder / "rolls.csv").write_bytes(text)
-    (folder / "twice.csv").write_bytes(text + text.partition(b"\n")[2])
     (folder / "truth.csv").write_text("file,roll_deg\nz,1\n")
     return folder
 

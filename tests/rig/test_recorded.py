@@ -90,7 +90,6 @@ NO_ROWS = (
     {"roll_deg": [1.0], "status": ["ok", "ok"]},
     {"roll_deg": ["far"], "status": ["ok"]},
     {"roll_deg": [1.0], "status": ["fine"]},
-    {"roll_deg": [1.0] * 3, "status": ["ok"] * 3, "file": ["b", "a", "a"]},
 )
 FOLDERS = {  # of frames, and how many are in each
     "a": {"a": 8},

@@ -3,7 +3,6 @@
 import math
 import os.path
 import re
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
@@ -272,8 +271,7 @@ def assess_rig(
     Raises
     ------
     UsageError
-        A column is missing, columns differ in length, a value cannot be one of its column, or one result
-        has several rows of a file.
+        A column is missing, columns differ in length, or a value cannot be one of its column.
 
     Examples
     --------
@@ -287,15 +285,7 @@ def assess_rig(
     frames = replace(_frames(rows), origins=origins)
     if len(origins) not in (0, len(frames.files)):
         raise UsageError(f"{len(origins)} origins of {len(frames.files)} rows: give one for each, or none")
-    if (file := doubled(frames.files, origins)) is not None:
-        raise UsageError(f"there are several rows of {file}: give one; `origins` tells several results apart")
     return assess_frames(frames, include_suspect=include_suspect, groups=groups)
-
-
-def doubled(files: Sequence[str], origins: Sequence[str] = ()) -> str | None:
-    """Return the first file of which one result has several rows; None where each has one."""
-    rows = Counter(zip(files, origins or [""] * len(files), strict=True))
-    return next((f for (f, _), n in rows.items() if n > 1 and f not in ("", "None", "nan", "<NA>")), None)
 
 
 def assess_frames(frames: RigFrames, *, include_suspect: bool = False, groups: str = AUTO) -> RigAssessment:
