@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -246,7 +246,7 @@ def match_pair(
     right: NDArray[Any],
     options: StereoOptions,
     find_road: FindRoad | None = None,
-    at_least: int = 0,
+    look: FirstLook | None = None,
 ) -> StereoMatch:
     """Match a rectified pair, and keep all that was found on the way.
 
@@ -257,8 +257,8 @@ def match_pair(
     find_road : callable, optional
         Finds the road's plane in a smaller map of the pair. The road is then matched along it, and what lies
         beside and above it at a third of the size; without it all is matched at full size.
-    at_least : int
-        Disparities to search, where `options` leave that to the program.
+    look : FirstLook, optional
+        At the pair, where there was one.
 
     Raises
     ------
@@ -271,14 +271,15 @@ def match_pair(
     if usable_range(1, first, width, options.block_size) < NARROWEST:
         raise InputError(f"images {width} px wide are too narrow to match from disparity {first} on")
     told = options.given_alignment(width, height)
-    small, look = SmallViews(views, given), FirstLook(None, None)
+    small, again = SmallViews(views, given), look is not None
     if options.measures_alignment:
-        look = first_look(small)
+        look = look or first_look(small)
     elif options.num_disparities is None:
-        look = look_for_range((views[0], level(views[1], told.lies)))
+        look = look or look_for_range((views[0], level(views[1], told.lies)))
+    look = look or FirstLook(None, None)
     count = options.num_disparities
     if count is None:
-        count = max(at_least, (width // 8 if look.range is None else look.range) - first)
+        count = (width // 8 if look.range is None else look.range) - first
     count = usable_range(count, first, width, options.block_size)
 
     blank, find_road = shows_nothing(views[0]), find_road if first >= 0 else None
@@ -327,8 +328,8 @@ def match_pair(
     if pair.road is not None:  # what is matched along the road's plane, no range ends
         at_end[pair.top :] &= matched[pair.top :] != pair.road.disparity
     end_fraction = np.count_nonzero(at_end) / valid if valid else 0.0
-    if end_fraction > MUCH_AT_END and options.num_disparities is None and not at_least:
-        return match_pair(left, right, options, find_road, 2 * count)  # the first look has seen too little
+    if end_fraction > MUCH_AT_END and options.num_disparities is None and not again:
+        return match_pair(left, right, options, find_road, replace(look, range=first + 2 * count))
     return StereoMatch(
         disparity=disparity,
         min_disparity=first,
