@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
 from rollcli.estimator.estimate import RollEstimate
-from rollcli.estimator.moments import LARGEST, Floats, Singles, map_of, strips
+from rollcli.estimator.moments import Floats, Singles, has_disparity, map_of, strips
 from rollcli.estimator.road.model import FARTHEST_SIDE, Coordinate, RoadModel
 from rollcli.estimator.road.sample import medians_of
 from rollcli.files.results import Row
@@ -307,7 +307,7 @@ class _Profile:
         doffs = 0.0 if calibration is None else calibration.doffs
         with np.errstate(over="ignore"):  # what becomes inf is no data
             d = stored.astype(np.float32)
-        known = (d > np.float32(max(0.0, -doffs))) & (d < LARGEST)
+        known = has_disparity(d) & (d > np.float32(-doffs))
         d[~known] = self.disparity
         rest: Singles | np.float32 = np.float32(1)
         root: Singles | np.float32 = np.float32(1)
