@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import SupportsIndex
 
 from rollcli.errors import UsageError
@@ -84,7 +85,7 @@ class StereoOptions:
             raise UsageError(f"sgbm-mode {self.mode!r}: choose one of {', '.join(MODES)}")
         _ = self.correction  # refuses what is none
 
-    @property
+    @cached_property
     def correction(self) -> Correction | None:
         """What the file that `align` names says, or what was read of it before; None where it names none.
 
