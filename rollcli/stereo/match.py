@@ -306,6 +306,12 @@ def match_pair(
             else:
                 doubt = CONTRADICTS
     pair = tried[-1]
+    valid, at_end = cv2.countNonZero(matched), matched >= first + count - 2
+    if pair.road is not None:  # what is matched along the road's plane, no range ends
+        at_end[pair.top :] &= matched[pair.top :] != pair.road.disparity
+    end_fraction = np.count_nonzero(at_end) / valid if valid else 0.0
+    if end_fraction > MUCH_AT_END and options.num_disparities is None and not again:
+        return match_pair(left, right, options, find_road, replace(look, range=first + 2 * count))
     if corrected == LEVEL:
         support = NOTHING_KNOWN
     elif support is None:
@@ -324,12 +330,6 @@ def match_pair(
         return _with_believed_columns(refined(found, views, lies), corrected, support)
 
     disparity = finished(matched)
-    valid, at_end = cv2.countNonZero(matched), matched >= first + count - 2
-    if pair.road is not None:  # what is matched along the road's plane, no range ends
-        at_end[pair.top :] &= matched[pair.top :] != pair.road.disparity
-    end_fraction = np.count_nonzero(at_end) / valid if valid else 0.0
-    if end_fraction > MUCH_AT_END and options.num_disparities is None and not again:
-        return match_pair(left, right, options, find_road, replace(look, range=first + 2 * count))
     return StereoMatch(
         disparity=disparity,
         min_disparity=first,
