@@ -3,7 +3,6 @@
 import os
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import SupportsIndex
 
 from rollcli.errors import UsageError
 from rollcli.stereo.correction import Correction, read_correction
@@ -75,7 +74,7 @@ class StereoOptions:
             value = getattr(self, name)
             if value is None and getattr(type(self), name) is None:
                 continue
-            if name not in _NOT_WHOLE and not isinstance(value, SupportsIndex):
+            if name not in _NOT_WHOLE and not hasattr(value, "__index__"):
                 raise UsageError(f"{name.replace('_', '-')} {value}: must be a whole number")
             if not low <= value <= high:
                 raise UsageError(f"{name.replace('_', '-')} {value}: must be from {low} to {high}")
@@ -110,7 +109,7 @@ class StereoOptions:
             return Correction(Misalignment(float(self.vertical_offset or 0)), None, 0.0, width, height)
         return given.resized(width, height)
 
-    @property
+    @cached_property
     def is_default(self) -> bool:
         """Whether the match itself is left to the program."""
         given = replace(self, downscale=1.0, align="auto", vertical_offset=None)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
-from rollcli.estimator.moments import Singles, strips
+from rollcli.estimator.moments import Singles
 from rollcli.stereo.misalignment import LEVEL, Misalignment
 
 _Number = TypeVar("_Number", np.float32, np.uint8)
@@ -345,9 +345,6 @@ def grey_between(
     return read_u, read_v, _remapped(twice, 2 * read_u, 2 * read_v, cv2.INTER_LINEAR)
 
 
-_STRIP = 64  # rows: what they need of a view twice as large stays in the processor's cache
-
-
 def rows_around(v: Singles, height: int) -> slice:
     """Return the rows of a view that `smoothed_between` sees for points in rows v: one more beside each."""
     top = max(0, min(int(v.min()), height) - 3)
@@ -355,13 +352,9 @@ def rows_around(v: Singles, height: int) -> slice:
 
 
 def grey_along(view: View, u: Singles, v: Singles) -> View:
-    """Return what `grey_between` does of the view `smoothed_between`, in rows that change little."""
-    grey = np.empty(u.shape, np.uint8)
-    for rows in strips(len(u), _STRIP):
-        near = rows_around(v[rows], len(view))
-        twice = smoothed_between(view[near])
-        grey[rows] = grey_between(twice, u[rows], v[rows] - np.float32(near.start))[2]
-    return grey
+    """Return what `grey_between` does of the view `smoothed_between`, of which it needs few rows."""
+    near = rows_around(v, len(view))
+    return grey_between(smoothed_between(view[near]), u, v - np.float32(near.start))[2]
 
 
 _TO_WHOLE = 1.5 * 2**23  # a float32 of this size has steps of 1, and so has a sum with it
