@@ -204,12 +204,15 @@ class RowFit(NamedTuple):
         Standard deviation of the blocks from it, outliers aside, px.
     off : ndarray, shape (N,)
         How far each block is from it, px.
+    frame : _Frame
+        Of the blocks.
     """
 
     lies: Misalignment
     errors: Misalignment
     spread: float
     off: Floats
+    frame: "_Frame"
 
 
 def fit_rows(seen: SeenBlocks, at: Misalignment = LEVEL, before: RowFit | None = None) -> RowFit:
@@ -223,13 +226,10 @@ def fit_rows(seen: SeenBlocks, at: Misalignment = LEVEL, before: RowFit | None =
     before : RowFit, optional
         Of the same blocks in the round before: those that were far off then count little from the start.
     """
-    frame = _Frame.of(seen)
-    design = frame.design(seen)
+    frame = _Frame.of(seen) if before is None else before.frame
+    design = frame.design
     shift, fixed = seen.shift.astype(np.float64), seen.weight.astype(np.float64)
-    start = None
-    if before is not None and before.off.size == shift.size:
-        start = before.off, before.spread
-    fit = _robust(design[_LINEAR], shift, fixed, start)
+    fit = _robust(design[_LINEAR], shift, fixed, None if before is None else (before.off, before.spread))
     variance = _variance(design[_LINEAR], fit, frame.tile)
     # a plain road's tilt or curve and its scale could cancel each other
     likely = np.array([np.inf] * 4 + [BELIEF.tilt * frame.near, BELIEF.bend * frame.half_height])
@@ -251,7 +251,7 @@ def fit_rows(seen: SeenBlocks, at: Misalignment = LEVEL, before: RowFit | None =
     parts = np.zeros((2, 6))
     parts[:, used] = (fit.values, errors)
     lies, errors_of = (Misalignment(*part.tolist()) for part in parts / frame.units)
-    return RowFit(lies, errors_of, fit.spread, fit.off)
+    return RowFit(lies, errors_of, fit.spread, fit.off, frame)
 
 
 def column_evidence(rows: MeasuredRows, spread: float) -> ColumnEvidence:
@@ -268,7 +268,7 @@ def column_evidence(rows: MeasuredRows, spread: float) -> ColumnEvidence:
     """
     seen, at, shape, factor = rows
     frame = _Frame.of(seen)
-    design = frame.shapes(frame.design(seen))
+    design = frame.shapes
     shift = seen.shift + np.float64(1) * at.down(seen.x, seen.y, seen.near)
     fixed = seen.weight.astype(np.float64)
     fit = _settled(_least_squares(design[:7], shift, fixed), design[:7], shift, fixed, spread / factor)
@@ -396,35 +396,39 @@ def _mean_over_causes(
 
 
 class _Frame(NamedTuple):
-    """Half the extent of what was seen, and the tile that each block lies in."""
+    """Half the extent of what was seen, the tile that each block lies in, and what a misalignment does there.
+
+    `design` has a row for each of the six parts, in `units` of them, and a column for each block.
+    """
 
     half_width: float
     half_height: float
     near: float
     tile: NDArray[np.intp]
+    design: Floats
 
     @staticmethod
     def of(seen: SeenBlocks) -> "_Frame":
-        x, y, near = (max(1.0, float(np.abs(each).max())) for each in seen[:3])
+        extent = np.array([max(1.0, float(np.abs(each).max())) for each in seen[:3]])
         column, row = (np.floor(each / _TILE).astype(np.intp) for each in seen[:2])
         row -= row.min()
-        return _Frame(x, y, near, (column - column.min()) * (row.max() + 1) + row)
+        x, y, near = seen[:3] / extent[:, None]
+        design = np.stack([np.ones_like(x), x, y, x * y, near, y * y])
+        half_width, half_height, nearest = extent.tolist()
+        tile = (column - column.min()) * (row.max() + 1) + row
+        return _Frame(half_width, half_height, nearest, tile, design)
 
     @property
     def units(self) -> Floats:
-        """What values of the first six columns are divided by to be parts of a misalignment."""
+        """What values of the design's rows are divided by to be parts of a misalignment."""
         x, y = self.half_width, self.half_height
         return np.array([1, x, y, x * y, self.near, y * y])
 
-    def design(self, seen: SeenBlocks) -> Floats:
-        """Return the columns of a misalignment: its six parts."""
-        x, y = seen.x / np.float64(self.half_width), seen.y / np.float64(self.half_height)
-        return np.stack([np.ones_like(x), x, y, x * y, seen.near / np.float64(self.near), y * y])
-
-    def shapes(self, design: Floats) -> Floats:
-        """Return those columns, and what else rows may show: a bend of the lower half, and four shapes."""
-        x, y = design[1:3]
-        return np.stack([*design, np.maximum(y, 0), x * x, x * x * y, x * y * y, y**3])
+    @property
+    def shapes(self) -> Floats:
+        """The design, and what else rows may show: a bend of the lower half, and four shapes."""
+        x, y = self.design[1:3]
+        return np.stack([*self.design, np.maximum(y, 0), x * x, x * x * y, x * y * y, y**3])
 
 
 class _Fit(NamedTuple):
