@@ -310,7 +310,8 @@ def match_pair(
     if pair.road is not None:  # what is matched along the road's plane, no range ends
         at_end[pair.top :] &= matched[pair.top :] != pair.road.disparity
     end_fraction = np.count_nonzero(at_end) / valid if valid else 0.0
-    if end_fraction > MUCH_AT_END and options.num_disparities is None and not again:
+    grows = usable_range(2 * count, first, width, options.block_size) > count
+    if grows and end_fraction > MUCH_AT_END and options.num_disparities is None and not again:
         return match_pair(left, right, options, find_road, replace(look, range=first + 2 * count))
     if corrected == LEVEL:
         support = NOTHING_KNOWN
