@@ -17,7 +17,8 @@ from rollcli.estimator.moments import usable_of
 from rollcli.files.codecs import arrays, pictures, png, tiff
 from rollcli.files.codecs.raw_map import Stored as Stored
 from rollcli.files.codecs.raw_map import require_map_shape
-from rollcli.files.containers import is_archive
+from rollcli.files.containers import is_archive, members
+from rollcli.files.naming import listed
 from rollcli.files.storage import read_bytes, read_frame
 
 _GREY = (np.uint8, np.uint16)  # of camera images
@@ -63,7 +64,8 @@ def read_stored(path: str | Path, name: str | None = None, *, rgb: bool = False)
     """
     name = name or str(path)
     if is_archive(str(path)):  # of one that can be read, each member is a frame
-        raise InputError(f"{name}: is a damaged archive")
+        inside = listed(f"{name}#{member}" for _, member in members(str(path)))
+        raise InputError(f"{name}: is an archive; name one of its maps: {inside}")
     if rgb:
         data = read_bytes(path, name)
         with about(name):
