@@ -287,13 +287,18 @@ def gross_outliers(values: Floats, variances: Floats) -> Flags:
 
 
 def _off_neighbours(values: Floats) -> Floats:
-    """How far each value is from the median of those before it, or of those after it, whichever is nearer."""
+    """How far each value is from the median of those before it, or of those after it, whichever is nearer.
+
+    At an end more than half as many are enough: those of a jump eight frames from it are like each other.
+    """
     width = TUNING.neighbours
     if len(values) <= width:
         return np.abs(values - np.median(values)) if len(values) else values
-    medians = np.median(sliding_window_view(values, width), axis=1)
-    before = np.concatenate([np.full(width, np.nan), medians[:-1]])
-    after = np.concatenate([medians[1:], np.full(width, np.nan)])
+    medians, few = np.median(sliding_window_view(values, width), axis=1), range(width // 2 + 1, width)
+    begin, end = ([np.median(each[:count]) for count in few] for each in (values, values[::-1]))
+    none = np.full(few[0], np.nan)
+    before = np.concatenate([none, begin, medians[:-1]])
+    after = np.concatenate([medians[1:], end[::-1], none])
     return np.asarray(np.fmin(np.abs(values - before), np.abs(values - after)))
 
 
