@@ -265,8 +265,7 @@ def alignment(rows: Sequence[Row], rig: RigAssessment) -> Chart:
                 for trace in rig_traces(rig, quantity, (0.0, 0.0), axis)
                 if trace["name"] == "mounting"
             ]
-    largest = max((abs(each) for trace in data for each in trace["y"] if each is not None), default=0.0)
-    end = 1.1 * max(largest, 0.5)
+    end = 1.1 * max([0.5, *(abs(each) for trace in data for each in trace["y"] if each is not None)])
     layout = {
         "hovermode": "closest",
         "showlegend": True,
@@ -383,7 +382,8 @@ def histogram(rows: Sequence[Row]) -> Chart:
     low, high = min(shown, default=low), max(shown, default=high)
     bins = min(_MOST_BINS, max(5, math.ceil(2 * math.sqrt(len(shown)))))  # fewer of fewer, higher than one
     step = round_step(max((high - low) / bins, _NARROWEST))
-    edges = np.arange(math.floor(low / step), math.floor(high / step) + 2) * step
+    # rounded as the angles are: 41 * 0.01 is more than 0.41, the bar of which it would leave out
+    edges = np.round(np.arange(math.floor(low / step), math.floor(high / step) + 2) * step, 6)
     spans = [f"{degrees(start, 3)} to {degrees(end, 3)}" for start, end in pairwise(edges.tolist())]
     data = []
     for status, colour in (("ok", "@c1"), ("suspect", "@suspect")):
@@ -391,7 +391,7 @@ def histogram(rows: Sequence[Row]) -> Chart:
         bars = {
             "type": "bar",
             "name": status,
-            "x": np.round(edges[:-1], 6).tolist(),
+            "x": edges[:-1].tolist(),
             "offset": 0,
             "y": np.histogram(rolls, edges)[0].tolist(),
             "width": step,

@@ -19,7 +19,7 @@ from rollcli import __version__
 from rollcli.files.results import Result
 from rollcli.pictures.figures import SLIDE, Size
 from rollcli.report import pictures, sources
-from rollcli.report.charts import all_charts, frame_axis, histogram, view
+from rollcli.report.charts import all_charts, frame_axis, histogram, outside, view
 from rollcli.report.options import ReportOptions
 from rollcli.report.pictures import Picture, Pictures
 from rollcli.report.sources import choose, subjects
@@ -185,7 +185,9 @@ AXES = {
 
 def _bars(rolls=(), suspect=()):
     rows = [row(f"{place}", each) for place, each in enumerate(rolls)]
-    chart = histogram(rows + [row("s", each, status="suspect") for each in suspect])
+    rows += [row("s", each, status="suspect") for each in suspect]
+    chart = histogram(rows)
+    assert sum(sum(each["y"]) for each in chart.data) == len(rows) - outside(rows)
     return [[(each["name"], each["x"], each["y"], each["width"]) for each in chart.data], chart.layout]
 
 
