@@ -16,7 +16,7 @@ import click
 from click.core import ParameterSource
 
 from rollcli.cli.types import FILE, FLAG, ParamType, Parsed
-from rollcli.errors import ExitStatus, InputError
+from rollcli.errors import ExitStatus, InputError, cause_of
 from rollcli.files.bounded import MOST_SETTINGS, as_utf8, read_given
 from rollcli.messages import say, show_tracebacks
 
@@ -390,7 +390,7 @@ def _load(path: str) -> dict[str, Any]:
             raise click.UsageError(f"{path}: is no file of options: it has a key of more than {_PARTS} parts")
         return tomllib.loads(text)
     except OSError as error:
-        raise click.UsageError(f"{path}: cannot be read: {error.strerror}") from error
+        raise click.UsageError(f"{path}: cannot be read: {cause_of(error)}") from error
     except InputError as error:
         raise click.UsageError(str(error)) from error
     except (ValueError, RecursionError) as error:  # TOML, UTF-8, numbers of thousands of digits

@@ -19,7 +19,7 @@ else:
 
 # endings that promise a format; a name with any other ending is a name like "rolls.txt" or "rolls"
 _OTHER_FORMATS = {
-    *(".csv", ".tsv", ".json", ".jsonl", ".ndjson", ".parquet", ".feather"),
+    *(".csv", ".tsv", ".json", ".jsonl", ".ndjson", ".parquet", ".feather", ".gz", ".bz2", ".xz", ".zst"),
     *(".xlsx", ".xls", ".ods", ".xml", ".yaml", ".toml", ".html", ".htm", ".pdf"),
 }
 
