@@ -33,8 +33,8 @@ FURTHER = {
     "cli": "run/test_recorded run/test_resume test_messages test_readme",
     "estimator": "rig/test_pose",
     "evaluate": (
-        "cli/test_recorded cli/test_mistakes cli/test_evaluate_paper cli/test_outputs estimator/test_energy "
-        "estimator/solvers test_package"
+        "cli/test_recorded cli/test_mistakes cli/test_evaluate_paper cli/test_outputs cli/test_heights "
+        "estimator/test_energy estimator/solvers test_package"
     ),
     "files": (
         "run/test_recorded cli/test_recorded run/test_update run/test_resume run/test_retry_failed "
