@@ -16,7 +16,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rollcli.errors import InputError, UsageError, as_usage, reading
+from rollcli.errors import InputError, UsageError, reading
 from rollcli.files.atomic import is_file, is_folder
 from rollcli.files.bounded import most_unpacked, state_of, too_large
 from rollcli.files.naming import natural_key, split_position
@@ -121,17 +121,16 @@ def members(path: str) -> Iterator[tuple[str, str]]:
 
     Raises
     ------
-    UsageError
+    InputError
         It is damaged, or cannot be read.
     """
-    with as_usage():
-        if path.lower().endswith(".tar"):
-            found = _tar_members(path)
-        else:
-            found = ((each.filename, "") for each in _zip(path).infolist() if not each.is_dir())
-        for name, position in found:
-            if not any(part.startswith((".", "__MACOSX")) and part != ".." for part in name.split("/")):
-                yield f"{path}#{name}{position}", name
+    if path.lower().endswith(".tar"):
+        found = _tar_members(path)
+    else:
+        found = ((each.filename, "") for each in _zip(path).infolist() if not each.is_dir())
+    for name, position in found:
+        if not any(part.startswith((".", "__MACOSX")) and part != ".." for part in name.split("/")):
+            yield f"{path}#{name}{position}", name
 
 
 def _tar_members(path: str) -> Iterator[tuple[str, str]]:

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rollcli.errors import UsageError, reading
+from rollcli.errors import UsageError, as_usage, reading
 from rollcli.files.atomic import is_file, is_folder, mode_of
 from rollcli.files.containers import file_of, frame_name, is_archive, members, refuse_packed
 from rollcli.files.stores.locations import base_name, is_object_url, is_url, public_name, split_url
@@ -246,11 +246,12 @@ class Search:
 
     def _in_archive(self, path: str) -> Iterator[tuple[str, str]]:
         """Yield readable members; all of its folders, for nobody sees which there are."""
-        for location, name in members(path):
-            if self._reads(name):
-                yield location, name
-            else:
-                self.left_out[posixpath.splitext(name)[1].lower()] += 1
+        with as_usage():
+            for location, name in members(path):
+                if self._reads(name):
+                    yield location, name
+                else:
+                    self.left_out[posixpath.splitext(name)[1].lower()] += 1
 
     def _in_archive_found(self, path: str, below: str) -> Iterator[tuple[str, str]]:
         """Yield the members of one of several archives; of maps a damaged one itself, to be an error."""

@@ -170,8 +170,8 @@ def test_whatever_counts_gives_a_mean_among_its_frames(frames, count, where):
 @pytest.mark.parametrize(("phi", "sd"), [(0.9, 0.4), (0.97, 0.1), (0.94, 0.3)])
 def test_gross_outliers_are_found_and_good_frames_are_not_called_so(phi, sd):
     values, errors = drive(5, 3000, phi=phi, sd=sd)
-    for few in (8, 13, 60):
-        assert gross_outliers(np.eye(few)[6] * 80, errors[:few] ** 2).nonzero()[0].tolist() == [6]
+    for few, at in ((8, 6), (13, 6), (60, 20)):
+        assert gross_outliers(np.eye(few)[at] * 80, errors[:few] ** 2).nonzero()[0].tolist() == [at]
     assert gross_outliers(values, errors**2).sum() <= 3
     rng = np.random.default_rng(6)
     bad = rng.random(3000) < 0.05
