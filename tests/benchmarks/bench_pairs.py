@@ -60,7 +60,10 @@ def main() -> None:
         for size in sys.argv[2:] or ("640x480", "1242x375"):
             for odd in (False, True):
                 some = list(rendered(Path(folder, size), pairs, size, odd=odd))
-                report(f"rendered {size}, {'turned' if odd else 'level'}", some)
+                bare = report(f"rendered {size}, {'turned' if odd else 'level'}", some)
+                if not odd:
+                    share = whole_program(some[0]) / bare
+                    print(f"  the program over them, start-up included: {share:.2f}")
     if STREETS.is_dir():
         named = sorted((STREETS / "left").iterdir())
         report("real streets, as they are", [Pair(left, STREETS / "right" / left.name) for left in named])
@@ -70,11 +73,11 @@ def rendered(folder: Path, pairs: int, size: str, *, odd: bool) -> Iterator[Pair
     """Render pairs; odd: with a right camera that is out of place."""
     width, height = map(int, size.split("x"))
     asked = SimulateOptions(frames=pairs, size=(width, height), seed=SEED, grey=True)
+    for side in ("left", "right"):
+        (folder / side).mkdir(parents=True, exist_ok=True)
     for number, spec in enumerate(draw_specs(asked)):
         frame = render_frame(spec)
         left, right = (folder / side / f"{number:04}.png" for side in ("left", "right"))
-        left.parent.mkdir(parents=True, exist_ok=True)
-        right.parent.mkdir(parents=True, exist_ok=True)
         cv2.imwrite(str(left), frame.left)
         cv2.imwrite(str(right), out_of_place(frame.right) if odd else frame.right)
         yield Pair(left, right, math.degrees(spec.roll))
@@ -89,8 +92,8 @@ def out_of_place(view: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return seen.astype(np.uint8, copy=False)
 
 
-def report(kind: str, pairs: list[Pair]) -> None:
-    """Time both ways on each pair, in turns."""
+def report(kind: str, pairs: list[Pair]) -> float:
+    """Time both ways on each pair, in turns; CPU seconds of all the bare ones."""
     ours, bare, errors, corrected = [], [], [], 0
     for pair in pairs:
         best = [math.inf, math.inf]
@@ -111,8 +114,7 @@ def report(kind: str, pairs: list[Pair]) -> None:
     print(f"{kind}: {len(pairs)} pairs, {corrected} corrected; CPU a pair: ", end="")
     print(f"ours {1e3 * np.mean(ours):.0f} ms, bare {1e3 * np.mean(bare):.0f} ms, ratio {ratio:.2f}", end="")
     print(f"; error median {np.median(errors):.3f}, worst {max(errors):.3f}" if errors else "")
-    if errors and not corrected:
-        print(f"  the program over them, start-up included: {whole_program(pairs[0]) / sum(bare):.2f}")
+    return sum(bare)
 
 
 def whole_program(first: Pair) -> float:
