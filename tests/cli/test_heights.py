@@ -19,9 +19,8 @@ def rendered(tmp_path_factory):
     size = {"size": (621, 188), "focal": 360.0, "pitch": 0.06, "kerb": (0.1, 0.1), "dips": 3}
     specs = tuple(FrameSpec("street", roll, index=i, seed=8, **size) for i, roll in enumerate((0.1, -0.05)))
     assert len(list(write_dataset(Dataset(folder, specs)))) == 2
-    done = rollcli(
-        *("estimate", "disparity", "--calib", "calib.txt", "-o", "rolls.csv", "--heights", "out"), cwd=folder
-    )
+    line = ("estimate", "disparity", "--calib", "calib.txt", "-o", "rolls.csv", "--heights", "out")
+    done = rollcli(*line, cwd=folder)
     assert done.status == 0, done.err
     return folder
 
@@ -76,11 +75,8 @@ def test_heights_of_another_size_do_not_keep_accuracy_from_comparing_angles(tmp_
 
 
 def test_heights_of_a_result_are_those_of_the_run(rendered):
-    done = rollcli(
-        *("heights", "disparity", "--from", "rolls.csv", "--calib", "calib.txt"),
-        *("-o", "again", "--preview", "seen", "--heights-range", "-0.2:0.2"),
-        cwd=rendered,
-    )
+    given = ("heights", "disparity", "--from", "rolls.csv", "--calib", "calib.txt", "-o", "again")
+    done = rollcli(*given, "--preview", "seen", "--heights-range", "-0.2:0.2", cwd=rendered)
     assert done.status == 0, done.err
     for name in ("frame_0001.tif", "frame_0002.tif"):
         again, first = (tifffile.imread(rendered / part / name) for part in ("again", "out"))

@@ -93,12 +93,10 @@ def test_times_of_parquet_are_no_angles(tmp_path, command, kind, value):
 
     types = {"duration": pyarrow.duration("s"), "date32": pyarrow.date32(), "time64": pyarrow.time64("ns")}
     angles = pyarrow.array([value], types[kind])
-    parquet.write_table(
-        pyarrow.table({"file": ["a.png"], "status": ["ok"], "roll_deg": angles}), tmp_path / "r.parquet"
-    )
-    refusal = rollcli(
-        command, "r.parquet", *(["--svg", "s"] if command == "report" else []), cwd=tmp_path
-    ).refused()
+    table = pyarrow.table({"file": ["a.png"], "status": ["ok"], "roll_deg": angles})
+    parquet.write_table(table, tmp_path / "r.parquet")
+    further = ["--svg", "s"] if command == "report" else []
+    refusal = rollcli(command, "r.parquet", *further, cwd=tmp_path).refused()
     assert "rollcli: r.parquet: " in refusal
 
 

@@ -6,13 +6,14 @@ from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from operator import attrgetter
 from typing import Any
 
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError, about, as_usage
 from rollcli.files.bounded import state_of
-from rollcli.files.naming import Input, listed, natural_key, split_position
+from rollcli.files.naming import Input, listed, split_position
 from rollcli.files.recordings import messages
 from rollcli.files.recordings.bags import Topic, opened
 from rollcli.files.recordings.messages import CAMERA_INFO, COMPRESSED, DISPARITY, IMAGE, CameraInfo
@@ -236,10 +237,9 @@ def _all(topics: dict[str, Topic]) -> str:
 
 def _only_map_topic(files: Sequence[str], topics: dict[str, Topic], name: str) -> str:
     """Return the only topic of maps."""
-    images = {each.name for each in _decodable(topics, IMAGE)}
     fitting = [each.name for each in topics.values() if each.type == DISPARITY]
-    encodings = _first_encodings(files, topics, images)
-    fitting += [each for each, pixels in encodings.items() if pixels in messages.MAP_ENCODINGS]
+    fitting += _of_maps(files, topics, IMAGE)
+    fitting = fitting or _of_maps(files, topics, COMPRESSED)  # which often repeat those
     if len(fitting) == 1:
         return fitting[0]
     options = " or ".join(f"--topic {each}" for each in sorted(fitting))
@@ -250,16 +250,17 @@ def _only_map_topic(files: Sequence[str], topics: dict[str, Topic], name: str) -
     raise UsageError(f"{name}: has no topic of disparity or depth maps{hint}; {_all(topics)}")
 
 
-def _first_encodings(files: Sequence[str], topics: dict[str, Topic], images: set[str]) -> dict[str, str]:
+def _of_maps(files: Sequence[str], topics: dict[str, Topic], kind: str) -> list[str]:
+    """Return the topics of images of a kind whose first whole one can be a map by its pixels."""
+    images = {each.name for each in _decodable(topics, kind)}
     found: dict[str, str] = {}
-    for path in files:
-        for message in opened(path).messages(images):
-            if message.topic not in found:
-                with contextlib.suppress(InputError):  # the next one may be whole
-                    found[message.topic] = messages.image_encoding(topics[message.topic], message.data)
-            if len(found) == len(images):
-                return found
-    return found
+    for message in (each for path in files for each in opened(path).messages(images)):
+        if message.topic not in found:
+            with contextlib.suppress(InputError):  # the next one may be whole
+                found[message.topic] = messages.image_encoding(topics[message.topic], message.data)
+        if len(found) == len(images):
+            break
+    return [each for each, pixels in found.items() if pixels in messages.MAP_ENCODINGS]
 
 
 def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic]) -> _Found:
@@ -298,7 +299,7 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
         if bag.broken:
             broken.append((path, stem))
     for each in frames.values():  # a recorder writes messages as they come in
-        each.sort(key=lambda frame: natural_key(frame.name))
+        each.sort(key=attrgetter("stamp"))
     return _Found(frames, cameras, places, broken)
 
 

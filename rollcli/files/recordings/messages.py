@@ -113,7 +113,9 @@ def camera_info(topic: Topic, data: memoryview) -> CameraInfo:
 
 
 def image_encoding(topic: Topic, data: memoryview) -> str:
-    """Return what the pixels of an Image are; empty for other types."""
+    """Return what the pixels of an Image are, or of a CompressedImage that says it; empty for other types."""
+    if topic.type == COMPRESSED:
+        return str(_decoded(topic, data).format).partition(";")[0]
     return str(_decoded(topic, data).encoding) if topic.type == IMAGE else ""
 
 

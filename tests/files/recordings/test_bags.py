@@ -46,6 +46,16 @@ def drive(count, values=None):
     return make
 
 
+def write_split(folder, *makes):
+    """Write a bag of several files, as rosbag2 splits it, the last one first. Returns the folder to name."""
+    folder.mkdir()
+    (folder / "metadata.yaml").touch()
+    for number, make in [*enumerate(makes)][::-1]:
+        name = f"{folder.name}_{number}"
+        write_bag(folder.parent, name, "mcap", make).rename(folder / f"{name}.mcap")
+    return folder
+
+
 @pytest.mark.parametrize("kind", mostly_slow(KINDS, "mcap"))
 def test_disparity_images_give_the_rows_of_the_same_maps_in_files(tmp_path, kind):
     (tmp_path / "maps").mkdir()
@@ -173,14 +183,11 @@ def test_a_bag_that_is_cut_gives_every_whole_message_and_a_line(tmp_path, kind):
     for tenth in range(1, 10):
         path.write_bytes(data[: len(data) * tenth // 10])
         done = rollcli("estimate", path.name, "-j", "1", cwd=tmp_path)
-        assert "internal error" not in done.err
-        assert "Traceback" not in done.err
         found = rows(done.out)
+        assert done.status == (3 if found else 2)
         counts.append(max(len(found) - 1, 0))
-        for row in found[:-1]:
-            assert whole[row["file"]] == row["roll_deg"]
+        assert all(whole[row["file"]] == row["roll_deg"] for row in found[:-1])
         if found:
-            assert done.status == 3
             assert (found[-1]["file"], found[-1]["status"]) == (f"{path.name}#rest", "error")
             assert "cut off" in found[-1]["message"]
     assert counts == sorted(counts)
@@ -309,9 +316,6 @@ def test_maps_of_cameras_whose_p_refers_to_another_one_have_a_calibration(tmp_pa
 
 def test_a_bag_of_several_files_is_one_drive(tmp_path):
     """Each has its own messages; raw views of one without a CameraInfo stay raw, which is said."""
-    folder = tmp_path / "split"
-    folder.mkdir()
-    (folder / "metadata.yaml").touch()
     values = maps(2)
 
     def part(number):
@@ -326,10 +330,9 @@ def test_a_bag_of_several_files_is_one_drive(tmp_path):
                     info = camera_info(store, stamp, (160, 120), p, [0.1] * 5, k)
                     yield f"/{side}/camera_info", stamp, info
 
-        write_bag(tmp_path, f"split_{number}", "mcap", make).rename(folder / f"split_{number}.mcap")
+        return make
 
-    part(1)
-    part(0)
+    folder = write_split(tmp_path / "split", part(0), part(1))
     found = rollcli("estimate", "split", "--topic", "/disparity", cwd=tmp_path)
     names = [f"split/split_{each}.mcap#/disparity@{START + each * STEP}" for each in range(2)]
     assert [row["file"] for row in rows(found.out)] == names
@@ -391,10 +394,10 @@ def test_depths_that_are_packed_as_inverses_are_depths(tmp_path):
             yield "/z", stamp, compressed(store, packed, "32FC1; compressedDepth png", stamp)
 
     path = write_bag(tmp_path, "depth", "mcap", make)
-    given = ["--topic", "/z", "--encoding", "depth", *camera, "--derotated", tmp_path / "up"]
+    given = ["--encoding", "depth", *camera, "--derotated", tmp_path / "up"]
     found = rows(rollcli("estimate", path, *given, cwd=tmp_path).out)
     assert [float(row["roll_deg"]) for row in found] == pytest.approx([0, 1], abs=0.05)
-    first, _ = package.open_recording(path, topic="/z", encoding="depth")
+    first, _ = package.open_recording(path, encoding="depth")
     assert first.disparity[0, 0] == pytest.approx(1 / 50, rel=1e-3)
     for number, each in enumerate(maps(2)):
         np.save(tmp_path / f"{number}.npy", each)
@@ -405,28 +408,38 @@ def test_depths_that_are_packed_as_inverses_are_depths(tmp_path):
 
 
 def test_rows_are_in_the_order_of_stamps_whatever_was_recorded_first(tmp_path):
-    def mixed(store):
-        for number in (2, 0, 1):
-            stamp = START + number * STEP
-            yield "/d", stamp, disparity_image(store, maps(3)[number], stamp, number)
+    """And in whichever of its files."""
 
-    found = rows(rollcli("estimate", write_bag(tmp_path, "mixed", "mcap", mixed), cwd=tmp_path).out)
-    assert [float(row["roll_deg"]) for row in found] == pytest.approx([0, 1, 2], abs=0.1)
+    def mixed(*numbers):
+        def make(store):
+            for number in numbers:
+                stamp = START + number * STEP
+                yield "/d", stamp, disparity_image(store, maps(4)[number], stamp, number)
+
+        return make
+
+    write_split(tmp_path / "mixed", mixed(3, 0), mixed(2, 1))
+    found = rows(rollcli("estimate", "mixed", cwd=tmp_path).out)
+    assert [float(row["roll_deg"]) for row in found] == pytest.approx([0, 1, 2, 3], abs=0.1)
 
 
-def test_a_raw_view_that_is_read_by_its_name_is_rectified(tmp_path):
+def test_a_raw_view_that_is_read_by_its_name_is_rectified_and_a_map_is_not(tmp_path):
     view, d = np.random.default_rng(0).integers(0, 255, (120, 160), np.uint8), (-0.2, 0.0, 0.0, 0.0, 0.0)
     k = (340.0, 0, 82, 0, 340, 58, 0, 0, 1)
 
     def make(store):
         yield "/l/camera_info", START, camera_info(store, START, (160, 120), P, d, k)
         yield "/l/image_raw", START, image(store, view, "mono8", START)
+        png = cv2.imencode(".png", view.astype(np.uint16))[1].tobytes()
+        yield "/l/image_raw/compressed", START, compressed(store, png, "16UC1; png compressed ", START)
 
     name = f"{write_bag(tmp_path, 'raw', 'mcap', make)}#/l/image_raw@{START}"
     seen = np.array(k).reshape(3, 3), np.array(d), np.eye(3), np.array(P).reshape(3, 4)[:, :3]
     where = cv2.initUndistortRectifyMap(*seen, (160, 120), cv2.CV_32FC1)
     expected = cv2.remap(view, *where, cv2.INTER_LINEAR)
     np.testing.assert_array_equal(read_image(name, name), expected)
+    depths = name.replace("@", "/compressed@")  # maps are not rectified
+    np.testing.assert_array_equal(read_image(depths, depths), view)
     # recorded anew under the same name, in another order
     write_bag(tmp_path, "b", "mcap", lambda store: [*make(store)][::-1]).rename(tmp_path / "raw.mcap")
     np.testing.assert_array_equal(read_image(name, name), expected)

@@ -104,16 +104,15 @@ def test_two_videos_are_paired_by_the_numbers_of_their_frames(tmp_path, drive):
     _, expected, views = drive
     for side, name in enumerate(("a.avi", "b.avi")):
         write_video(tmp_path / name, [each[side] for each in views], "FFV1")
-    done = rollcli("estimate", "--left", "a.avi", "--right", "b.avi", "-j", "2", cwd=tmp_path)
+    pair = ("--left", "a.avi", "--right", "b.avi")
+    done = rollcli("estimate", *pair, "-j", "2", cwd=tmp_path)
     assert (done.status, without_names(rows(done.out))) == (0, without_names(expected)), done.err
     assert [rows(done.out)[4][key] for key in ("file", "right_file")] == ["a.avi#000004", "b.avi#000004"]
     write_video(tmp_path / "b.avi", [each[1] for each in views[1:]], "FFV1")
-    refusal = rollcli("estimate", "--left", "a.avi", "--right", "b.avi", cwd=tmp_path).refused()
+    refusal = rollcli("estimate", *pair, cwd=tmp_path).refused()
     assert "a.avi has 5 frames, b.avi 4" in refusal
     write_video(tmp_path / "b.avi", [each[1][:, 2:] for each in views], "FFV1")
-    refusal = rollcli(
-        "disparity", "--left", "a.avi", "--right", "b.avi", "-o", "maps", cwd=tmp_path
-    ).refused()
+    refusal = rollcli("disparity", *pair, "-o", "maps", cwd=tmp_path).refused()
     assert "give two views of one size" in refusal
 
 
@@ -220,9 +219,7 @@ def test_an_interrupted_run_over_a_video_is_resumed_to_the_same_bytes(tmp_path, 
     inputs = (tmp_path / "rolls.csv.inputs").read_bytes()
     whole = keep_rows(tmp_path / "rolls.csv", 2)
     assert [row["status"] == "error" for row in rows(whole.decode())] == [False] * (COUNT - 1) + [True]
-    refusal = rollcli(
-        "estimate", "drive.mkv", "--side-by-side", "top-bottom", *given[3:], "--resume", cwd=tmp_path
-    ).refused()
+    refusal = rollcli(*given[:3], "top-bottom", *given[3:], "--resume", cwd=tmp_path).refused()
     assert "side-by-side" in refusal
     assert rollcli(*given, "--resume", "-j", "3", cwd=tmp_path).status == 3
     assert (tmp_path / "rolls.csv").read_bytes() == whole
@@ -232,9 +229,8 @@ def test_an_interrupted_run_over_a_video_is_resumed_to_the_same_bytes(tmp_path, 
 @pytest.mark.slow
 def test_a_result_of_a_video_goes_on_to_the_other_commands(tmp_path, drive):
     write_video(tmp_path / "drive.mkv", beside(drive[2]))
-    done = rollcli(
-        "estimate", "drive.mkv", "--side-by-side", "-o", "rolls.csv", "--disparity", "maps", cwd=tmp_path
-    )
+    line = ("estimate", "drive.mkv", "--side-by-side", "-o", "rolls.csv", "--disparity", "maps")
+    done = rollcli(*line, cwd=tmp_path)
     assert done.status == 0, done.err
     for given in (
         ["derotate", "maps", "--from", "rolls.csv", "-o", "upright"],
@@ -279,10 +275,7 @@ def test_what_is_no_usable_video_is_told_in_a_line(tmp_path, drive):
         (["list.mp4", "--side-by-side"], "list.mp4: is no MP4, MOV, AVI or Matroska file"),
         (["empty.mp4", "--side-by-side"], "empty.mp4: is no MP4"),
         (["none.mp4", "--side-by-side"], "none.mp4: no such file"),
-        (
-            ["s3://bucket/drive.mp4", "--side-by-side"],
-            "recordings are read from local disk: download it first",
-        ),
+        (["s3://bucket/a.mp4", "--side-by-side"], "recordings are read from local disk: download it first"),
     ):
         done = rollcli("estimate", *given, cwd=tmp_path)
         assert (done.status, done.out, done.err.count("\n")) == (2, "", 1), (given, done.err)

@@ -426,9 +426,8 @@ def test_a_run_on_an_encrypted_cluster_gives_the_same_rows_and_a_stranger_is_ref
     write_maps(tmp_path / "maps", 3)
     rollcli("estimate", "maps", "-q", "-o", "local.csv", cwd=tmp_path)
 
-    done = rollcli(
-        "estimate", "maps", "-q", "-o", "far.csv", "--scheduler", address, cwd=tmp_path, **variables
-    )
+    given = ("-q", "-o", "far.csv", "--scheduler", address)
+    done = rollcli("estimate", "maps", *given, cwd=tmp_path, **variables)
 
     assert (done.status, done.err) == (0, "")
     assert (tmp_path / "far.csv").read_bytes() == (tmp_path / "local.csv").read_bytes()
