@@ -2,6 +2,7 @@
 
 import time
 import tracemalloc
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -150,6 +151,12 @@ def test_white_space_and_repeated_keys_take_a_time_in_proportion_to_their_number
     before = time.process_time()
     refusal(text)
     assert time.process_time() - before < 3
+
+
+def test_a_baseline_that_a_file_lacks_is_added_to_what_it_says():
+    text = samples.middlebury(OFFSET)
+    found = parse(text.replace("baseline=", "was="), baseline=OFFSET.baseline)
+    assert replace(found, source="calib0") == parse(text)
 
 
 def test_colour_cameras_of_the_same_baseline_are_not_told_apart():

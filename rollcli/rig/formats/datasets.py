@@ -97,11 +97,9 @@ def read_middlebury(file: File) -> Fields:
         if doffs is not None and abs(doffs - between) > _SAME_DOFFS:
             raise file.error(f"is contradictory: doffs is {doffs:g} px, its cameras differ by {between:g} px")
         doffs = between if doffs is None else doffs
-    if "baseline" not in values:
-        return Fields(fx, fy, cx, cy, None, doffs, lacks="has no baseline: the file is cut off")
-    baseline = _MM * file.number(values["baseline"], "baseline")
+    baseline = _MM * file.number(values["baseline"], "baseline") if "baseline" in values else None
     size = file.size(values.get("width"), values.get("height"), "width and height")
-    return Fields(fx, fy, cx, cy, baseline, doffs or 0.0, *size)
+    return Fields(fx, fy, cx, cy, baseline, doffs, *size, lacks="has no baseline: the file is cut off")
 
 
 def _camera(file: File, values: Mapping[str, str], key: str) -> tuple[float, float, float, float]:
