@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -322,7 +323,8 @@ def _pairs(rig: RigAssessment, paths: Sequence[str]) -> Iterator[tuple[Frame, Fr
         options = _recorded(path)
         stereo = replace(options.stereo, align="auto", vertical_offset=None)
         options = options._replace(stereo=stereo, region=RegionOptions())
-        for name, data in results.pieces_of(path):
-            for row in results.parse_rows(data, name):
-                if (run, row.file) in names and row.right_file and not is_remote(row.file):
-                    yield frame_of_row(row, path), options
+        with suppress(InputError):  # what came by a pipe is gone
+            for name, data in results.pieces_of(path):
+                for row in results.parse_rows(data, name):
+                    if (run, row.file) in names and row.right_file and not is_remote(row.file):
+                        yield frame_of_row(row, path), options

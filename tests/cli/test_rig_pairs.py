@@ -66,6 +66,13 @@ def test_each_drive_is_gated_and_the_correction_is_of_the_last_one_alone(pairs):
     assert columns(pairs / "last.json") == columns(pairs / "use.json")
 
 
+def test_the_correction_of_a_piped_result_is_what_its_rows_say(pairs):
+    result = (pairs / "off.csv").read_text()
+    assert rollcli("rig", "-", "--correction", "piped.json", "-q", cwd=pairs, stdin=result).status == 0
+    piped, whole = (json.loads((pairs / name).read_text()) for name in ("piped.json", "use.json"))
+    assert all(piped[name] == whole[name] for name in TRUTH)
+
+
 def test_after_a_jump_the_correction_is_of_the_pairs_since(pairs):
     (pairs / "both").mkdir()
     lines = []
