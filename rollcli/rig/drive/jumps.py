@@ -135,7 +135,8 @@ def _placed(series: Series, found: Found, whole: Likelihood) -> list[int]:
             cells = make_cells(part, most=TUNING.cells // 2)
             likelihood, level = Likelihood(cells, whole.unit), np.ones((len(cells.first), 1))
             near = np.abs(cells.first + begin - start) <= 1.5 * cell
-            if not near.any() or cells.width >= cell:
+            # behind many frames that do not count, those before the jump are not in this part
+            if not near.any() or near[0] or cells.width >= cell:
                 break
             evidence = likelihood.scan(level, likelihood.fit(level))
             start = begin + int(cells.first[int(np.where(near, evidence, -np.inf).argmax())])
