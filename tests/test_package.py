@@ -99,9 +99,8 @@ def test_the_wheel_runs_in_a_fresh_environment(installed, tmp_path):
     _run(program, "report", "rolls.csv", "-o", "rolls.html", cwd=tmp_path)
     assert "frame_0004.npy" in (tmp_path / "rolls.html").read_text("utf-8")
     client = "import rollcli, sys; print(rollcli.estimate_roll(rollcli.read_disparity(sys.argv[1])).roll_deg)"
-    told = _run(
-        str(installed / "python"), "-c", client, str(SAMPLES / "maps" / "frame_0001.png"), cwd=tmp_path
-    )
+    frame = str(SAMPLES / "maps" / "frame_0001.png")
+    told = _run(str(installed / "python"), "-c", client, frame, cwd=tmp_path)
     assert float(told.stdout) == pytest.approx(-8, abs=0.1)
 
 

@@ -100,7 +100,9 @@ def calibration_finder(given: CalibrationOptions) -> Callable[[str], Calibration
     fetched = fetch_all(filter(is_url, files), MAX_BYTES)  # one after the other takes long
     read = cache(lambda path: _read([path], given, fetched))  # one may be for a thousand frames
 
-    def of(name: str) -> Calibration:
+    def of(name: str) -> Calibration | None:
+        if _is_broken(name):
+            return None
         stem = PurePosixPath(frame_name(name)).stem
         while stem not in by_stem and "_" in stem:  # KITTI's 000010.txt is for 000010_10.png
             stem = stem.rpartition("_")[0]
@@ -120,10 +122,20 @@ def mask_finder(mask: str | None) -> Callable[[str], str | None]:
     if mask is not None and (is_place(mask) or is_archive(mask)):
         found = find_inputs([mask], Search(recursive=True))
         by_stem = gathered((Path(frame_name(each.name)).stem, each.location) for each in found)
-        return lambda name: _only(by_stem, PurePosixPath(frame_name(name)).stem, "mask", name, mask)
+
+        def of(name: str) -> str | None:
+            stem = PurePosixPath(frame_name(name)).stem
+            return None if _is_broken(name) else _only(by_stem, stem, "mask", name, mask)
+
+        return of
     if mask is not None and not (is_url(mask) or is_file(file_of(mask))):
         raise UsageError(f"{mask}: no such mask file or folder")
     return lambda name: mask
+
+
+def _is_broken(name: str) -> bool:
+    """Tell whether this is no frame but a row's error: a damaged archive, or the rest of a recording."""
+    return is_archive(name) or is_rest(name)
 
 
 def _only(by_stem: Mapping[str, Sequence[str]], stem: str, what: str, name: str, folder: str) -> str:
@@ -198,8 +210,9 @@ def check_depth(frames: Sequence[Frame], encoding: EncodingOptions) -> None:
     ------
     UsageError
     """
-    used = (frame.calibration for frame in frames if encoding.encoding == "depth")
-    if any(calibration is None or calibration.baseline is None for calibration in used):
+    used = (frame.calibration for frame in frames if not _is_broken(frame.file))
+    lacking = (calibration is None or calibration.baseline is None for calibration in used)
+    if encoding.encoding == "depth" and any(lacking):
         raise UsageError(
             "--encoding depth needs a focal length and a baseline, which turn a depth into a disparity: "
             "give --calib, or --focal, --principal-point and --baseline"

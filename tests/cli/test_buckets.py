@@ -53,9 +53,8 @@ def test_images_of_kept_rows_that_are_missing_are_made_again(bucket, tmp_path, p
         f"read  {bucket}/maps/frame{index}.png" for index in (1, 4)
     ]
     done = rollcli(*line, "--resume", cwd=tmp_path)
-    assert (done.status, "images are missing or empty for 2 of the kept rows" in done.err) == (0, True), (
-        done.err
-    )
+    told = "images are missing or empty for 2 of the kept rows" in done.err
+    assert (done.status, told) == (0, True), done.err
     assert joined(f"{bucket}/rolls.csv") == rows
     assert objects_below(level) == images
 

@@ -189,9 +189,8 @@ def test_small_files_need_no_room_for_the_largest_ones(tmp_path, inputs):
     write_maps(tmp_path / "maps", 2)
     (tmp_path / "list").write_text("maps/frame0.png\nmaps/frame1.png\n")
     with (tmp_path / "list").open("rb") as stdin:
-        done = limited(
-            "estimate", inputs, "-j", "1", "-o", "r.csv", cwd=tmp_path, memory=800 * 2**20, stdin=stdin
-        )
+        line = ("estimate", inputs, "-j", "1", "-o", "r.csv")
+        done = limited(*line, cwd=tmp_path, memory=800 * 2**20, stdin=stdin)
     assert done.returncode == 0, done.stderr
 
 

@@ -40,9 +40,8 @@ def test_each_pair_gives_a_kitti_map_named_after_its_left_image(pairs):
 @pytest.mark.slow
 @needs_roads
 def test_on_real_roads_most_pixels_of_the_matched_region_are_valid(tmp_path):
-    done = match(
-        tmp_path, "-o", "maps", "--downscale", "2", left=str(ROADS / "left"), right=str(ROADS / "right")
-    )
+    views = {side: str(ROADS / side) for side in ("left", "right")}
+    done = match(tmp_path, "-o", "maps", "--downscale", "2", **views)
     assert done.status == 0
     maps = sorted((tmp_path / "maps").iterdir())
     assert len(maps) == len(list((ROADS / "left").iterdir()))

@@ -181,9 +181,8 @@ def test_a_wide_view_is_matched_over_a_wider_range():
     v = np.arange(height, dtype=np.float32)
     truth = 20 + 0.3 * v + 9 * np.sin(np.pi * v / height)
     u = np.arange(width, dtype=np.float32)
-    right = cv2.remap(
-        texture, u + truth[:, None], np.broadcast_to(v[:, None], (height, width)), cv2.INTER_LANCZOS4
-    )
+    rows = np.broadcast_to(v[:, None], (height, width))
+    right = cv2.remap(texture, u + truth[:, None], rows, cv2.INTER_LANCZOS4)
     plane = (20 / 3, 0.0, 0.3)
     options = StereoOptions(align="off")
 

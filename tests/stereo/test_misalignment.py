@@ -112,11 +112,9 @@ def test_every_part_has_its_advice():
 
 @pytest.mark.parametrize("signs", list(itertools.product((-1, 1), repeat=4)))
 def test_the_reach_is_the_largest_shift_of_the_four_corners(signs):
-    offset, rotation, scale, twist = (
-        sign * size for sign, size in zip(signs, (0.7, 2e-3, 5e-3, 4e-5), strict=True)
-    )
+    parts = zip(signs, (0.7, 2e-3, 5e-3, 4e-5), strict=True)
+    offset, rotation, scale, twist = (sign * size for sign, size in parts)
     corners = itertools.product((-320, 320), (-100, 100))  # of a view of 640 x 200 pixels
     shifts = [offset + rotation * x + scale * y + twist * x * y for x, y in corners]
-    assert Misalignment(offset, rotation, scale, twist).reach(200, 640) == pytest.approx(
-        max(map(abs, shifts))
-    )
+    reach = Misalignment(offset, rotation, scale, twist).reach(200, 640)
+    assert reach == pytest.approx(max(map(abs, shifts)))

@@ -157,9 +157,8 @@ def test_matched_roads_lie_nearer_to_where_they_are_and_so_do_their_angles(monke
 def test_no_disparity_is_shifted_below_zero():
     v = np.arange(64, dtype=np.float32)[:, None]
     disparity = np.broadcast_to(0.02 * v + np.float32(0.05), (64, 128)).astype(np.float32)
-    right = cv2.GaussianBlur(
-        np.random.default_rng(0).integers(0, 256, (64, 128), dtype=np.uint8), (0, 0), 1.2
-    )
+    noise = np.random.default_rng(0).integers(0, 256, (64, 128), dtype=np.uint8)
+    right = cv2.GaussianBlur(noise, (0, 0), 1.2)
     left = np.roll(right, -1, axis=1)  # a pixel farther than infinity
 
     assert refined(disparity, (left, right)).min() >= 0
