@@ -254,7 +254,7 @@ def _of_maps(files: Sequence[str], topics: dict[str, Topic], kind: str) -> list[
     """Return the topics of images of a kind whose first whole one can be a map by its pixels."""
     images = {each.name for each in _decodable(topics, kind)}
     found: dict[str, str] = {}
-    for message in (each for path in files for each in opened(path).messages(images)):
+    for message in (each for path in files if images for each in opened(path).messages(images)):
         if message.topic not in found:
             with contextlib.suppress(InputError):  # the next one may be whole
                 found[message.topic] = messages.image_encoding(topics[message.topic], message.data)
