@@ -141,5 +141,7 @@ def _doubts_of_plane(
     begins = max(at_reach, 2 * farthest / nearest)
     ahead = (near < begins) & (near > begins / 2)
     seen = valid & ahead
-    if seen.sum() > _ENOUGH * ahead.sum() and on_road[seen].mean() < tuning.least_beyond:
+    # from a truck's height a road is narrow there, and its lane tells more than all that is beside it
+    shares = [on_road[those].mean() for those in (seen, seen & lane) if those.any()]
+    if seen.sum() > _ENOUGH * ahead.sum() and max(shares) < tuning.least_beyond:
         yield "the plane is closed off near ahead, as the floor of a room or a road behind a near car is"

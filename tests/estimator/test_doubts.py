@@ -115,6 +115,16 @@ def test_a_road_that_fills_the_map_is_beyond_doubt(roll_deg):
     assert (estimate.status, estimate.message) == ("ok", "")
 
 
+def test_a_street_that_is_narrow_from_a_truck_is_beyond_doubt():
+    """From 8 camera heights on, house fronts 0.9 of them to the sides fill most of the view."""
+    flat = road(0)
+    fronts = (flat[-1, 320] - flat[-2, 320]) * np.abs(U - 320) / 0.9
+
+    estimate = estimate_roll(with_noise(np.maximum(flat, fronts)))
+
+    assert (estimate.status, estimate.message) == ("ok", "")
+
+
 @pytest.mark.parametrize("rows", [5, 10, 20])
 def test_a_border_of_small_disparities_below_the_road_is_no_end_of_it(rows):
     bordered = with_noise(road(4))

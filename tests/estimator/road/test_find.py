@@ -40,7 +40,12 @@ def verdict(disparity):
 
 
 def says_no_road(found):
-    reasons = ("the plane ends near ahead", "the plane is closed off", "the view is as narrow")
+    reasons = (
+        "the plane ends near ahead",
+        "is closed off",
+        "the view is as narrow",
+        "the roll is at its bound",
+    )
     return found.startswith("no road: ") or (
         found.startswith("suspect: ") and any(reason in found for reason in reasons)
     )
