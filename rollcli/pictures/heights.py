@@ -50,7 +50,7 @@ _SAMPLED = 125, 125  # rows and columns: twice as many move no height by 0.1 mm
 _TOLERANCES = 0.12, 0.02
 _LEAST_SPREAD = 0.02  # px along the road
 _ROUNDS = 6  # of a fit
-_PER_PX = 32  # steps of the table of a profile
+_STEPS = 4096  # of the table of a profile, up to the bottom's disparity
 METRES, CAMERA_HEIGHTS = "metres", "camera heights"
 
 
@@ -208,7 +208,7 @@ def steadied(heights: Singles) -> Singles:
 class _Profile:
     """The road along its middle, about a row near ahead: d = disparity + rise y + bend y^2, px.
 
-    `further` is how many px further down the road has each disparity than that, in steps of 1 / `_PER_PX` px.
+    `further` is how many px further down the road has each disparity than that; `_STEPS` up to the bottom's.
     """
 
     road: FittedRoad
@@ -249,9 +249,9 @@ class _Profile:
         near = (np.abs(side) < _HALF_LANE) & (share > 0) & (share < 1 + _OVER)
         d, gap = d[near], gap[near]
         place = (share[near] * (_BINS / (1 + _OVER))).astype(np.uint16)
-        middles = bottom * _FAR ** ((np.arange(_BINS) + 0.5) * ((1 + _OVER) / _BINS) - 1)
-        scaled = np.maximum(1, bottom / (2 * middles)) * middles / self.rise
-        design = _profile_basis(middles / bottom)
+        middles = _FAR ** ((np.arange(_BINS) + 0.5) * ((1 + _OVER) / _BINS) - 1)  # of the bins, in bottoms
+        scaled = np.maximum(1, 1 / (2 * middles)) * middles * (bottom / self.rise)
+        design = _profile_basis(middles)
         weights: Floats = np.zeros(_BINS)
         fitted, left = np.zeros(4), gap
         for tolerance in _TOLERANCES:
@@ -264,9 +264,9 @@ class _Profile:
             fitted = fitted + more
             left = gap - (design @ fitted)[place]
         (used,) = np.nonzero(weights > 0)
-        steps = np.arange(math.ceil(middles[used[-1]] * _PER_PX) + 1) + 0.5
-        kept = np.clip(steps / _PER_PX, middles[used[0]], middles[used[-1]])
-        return replace(self, further=(_profile_basis(kept / bottom) @ -fitted).astype(np.float32))
+        steps = np.arange(math.ceil(middles[used[-1]] * _STEPS) + 1) + 0.5
+        kept = np.clip(steps / _STEPS, middles[used[0]], middles[used[-1]])
+        return replace(self, further=(_profile_basis(kept) @ -fitted).astype(np.float32))
 
     def _sampled(self, disparity: NDArray[Any]) -> tuple[Singles, Singles, Singles]:
         """Return disparity, place across in camera heights and px above the parabola of some pixels."""
@@ -291,7 +291,8 @@ class _Profile:
         foot = bent / ((rise + np.float32(self.rise)) * np.float32(0.5))
         foot += (over - bent) / rise
         if self.further is not None:
-            steps = np.minimum(disparity * np.float32(_PER_PX), np.float32(len(self.further) - 1))
+            steps = disparity * np.float32(_STEPS / (2 * self.disparity))
+            steps = np.minimum(steps, np.float32(len(self.further) - 1))
             foot += self.further.take(steps.astype(np.intp))
         return foot, rise
 
