@@ -68,7 +68,7 @@ def _plan(options: ConvertOptions) -> list[Frame]:
     if not (options.paired or isinstance(options, DerotateOptions)):
         check_depth(frames, options.encoding)
     rows = _find_rows(frames, options)
-    say(*check_first_size(frames, options.frame)[0])
+    check_first_size(frames, options)
     wanted = [
         replace(frame, row=row)
         for frame, row in zip(frames, rows, strict=True)

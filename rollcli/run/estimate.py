@@ -50,7 +50,7 @@ def _run(plan: Plan, resume_command: str) -> ExitStatus:
     with open_output(plan) as output:
         kept = output.kept
         progress = Progress(len(plan.frames), options.running, options.encoding, summary=kept.summary)
-        notes = [*plan.notes, *(calibration_notes(plan.frames) if options.calibration.given else [])]
+        notes = calibration_notes(plan.frames) if options.calibration.given else []
         for note in (*notes[:_NOTES], *kept.notes()):
             progress.note(note)
         whole = False

@@ -30,7 +30,7 @@ from rollcli.messages import say
 from rollcli.rig.calibration import Calibration, CalibrationOptions, require_calibration
 from rollcli.rig.read_calibration import MAX_BYTES, parse_calibration, with_numbers
 from rollcli.run.frame import Frame
-from rollcli.run.options import EncodingOptions, FrameOptions, FramesOptions, InputOptions, Layout
+from rollcli.run.options import EncodingOptions, FramesOptions, InputOptions, Layout
 
 _MARK = "_camera"  # Cityscapes: aachen_000000_000019_camera.json
 
@@ -159,14 +159,12 @@ def calibration_notes(frames: Sequence[Frame]) -> list[str]:
     return list(dict.fromkeys(note for calibration in used for note in calibration.notes))
 
 
-def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> tuple[list[str], Calibration | None]:
-    """Refuse a calibration that is not for the size of the first frame, where that has one.
+def check_first_size(frames: Sequence[Frame], options: FramesOptions) -> Calibration | None:
+    """Refuse a calibration that is not for the size of the first frame, and say what speaks against it.
 
     Returns
     -------
-    notes : list of str
-        What speaks against its size.
-    calibration : Calibration or None
+    Calibration or None
         Of the first frame's map, whose sides may have been rounded; None where that cannot be told.
 
     Raises
@@ -174,33 +172,33 @@ def check_first_size(frames: Sequence[Frame], options: FrameOptions) -> tuple[li
     UsageError
         So it is; or views side by side seem squeezed, and no calibration says that they are not.
     """
-    first = next(iter(frames), None)
-    if first is None or (first.calibration is None and options.side_by_side is None):
-        return [], None
+    first, layout = next(iter(frames), None), options.pairs.side_by_side
+    if first is None or (first.calibration is None and layout is None):
+        return None
     from rollcli.run.read import read_map, read_views  # only here does a dispatcher decode an image
     from rollcli.stereo.views import matched_shape
 
     try:
         if first.right_file:
-            shape = read_views(first, options)[0].shape[:2]
+            shape = read_views(first, options.frame)[0].shape[:2]
         else:
-            shape = read_map(first, options).values.shape
+            shape = read_map(first, options.frame).values.shape
     except InputError:
-        return [], None  # its row will say so
+        return None  # its row will say so
     height, width = shape
     if first.calibration is None:
-        if width < height and options.side_by_side == "left-right":
+        if width < height and layout == "left-right":
             raise UsageError(
                 f"{first.file}: its views would be {width}x{height} px, higher than wide, as where both are "
                 "squeezed into one image, which changes angles: stretch them to twice their width, or give "
-                "--calib, or --focal and --principal-point, of the views as they are"
+                "estimate --calib, or --focal and --principal-point, of the views as they are"
             )
-        return [], None
-    doubt = first.calibration.seems_of_another_size(width, height)
-    if doubt:
-        return [doubt], None
+        return None
+    if doubt := first.calibration.seems_of_another_size(width, height):
+        _tell([doubt], options)
+        return None
     matched = matched_shape(shape, options.stereo.downscale if first.right_file else 1.0)
-    return [], first.calibration.for_size(width, height).for_size(*reversed(matched))
+    return first.calibration.for_size(width, height).for_size(*reversed(matched))
 
 
 def check_depth(frames: Sequence[Frame], encoding: EncodingOptions) -> None:

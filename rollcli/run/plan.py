@@ -17,12 +17,11 @@ from rollcli.run.result_file import inputs_path
 
 @dataclass(frozen=True)
 class Plan:
-    """What a run is asked, its frames in the order of their rows, further columns, and what to say before."""
+    """What a run is asked, its frames in the order of their rows, and further columns."""
 
     options: EstimateOptions
     frames: Sequence[Frame]
     further: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
 
     @property
     def output(self) -> str:
@@ -70,15 +69,14 @@ def make_plan(options: EstimateOptions) -> Plan:
     )
     every, frames = frames, _shard(frames, options.result)
     outputs.check_places(frames, options.folders)
-    notes, first = check_first_size(every, options.frame)
-    further = further_columns(every, first, options)
+    further = further_columns(every, check_first_size(every, options), options)
     if not (options.running.overwrite or options.result.resume):
         outputs.check_nothing_is_there(outputs.files_of(frames, options.writes))
     if plan.format == "parquet" and is_stream(plan.output):
         raise UsageError("Parquet is a folder of parts: name it with --output")
     if plan.format == "parquet" and not options.inputs.sorted:  # those are read as they are needed
         require_utf8(name for frame in frames for name in (frame.file, frame.right_file))
-    return replace(plan, frames=frames, further=further, notes=tuple(notes))
+    return replace(plan, frames=frames, further=further)
 
 
 def _check_start(options: EstimateOptions) -> None:
