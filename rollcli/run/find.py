@@ -32,6 +32,7 @@ from rollcli.rig.read_calibration import MAX_BYTES, parse_calibration, with_numb
 from rollcli.run.frame import Frame
 from rollcli.run.options import EncodingOptions, FramesOptions, InputOptions, Layout
 
+_TRIED = 8  # frames, until one can be read
 _MARK = "_camera"  # Cityscapes: aachen_000000_000019_camera.json
 
 
@@ -162,29 +163,35 @@ def calibration_notes(frames: Sequence[Frame]) -> list[str]:
 def check_first_size(frames: Sequence[Frame], options: FramesOptions) -> Calibration | None:
     """Refuse a calibration that is not for the size of the first frame, and say what speaks against it.
 
+    The first is that which can be read, as far as one of the first few can.
+
     Returns
     -------
     Calibration or None
-        Of the first frame's map, whose sides may have been rounded; None where that cannot be told.
+        Of its map, whose sides may have been rounded; None where that cannot be told.
 
     Raises
     ------
     UsageError
         So it is; or views side by side seem squeezed, and no calibration says that they are not.
     """
-    first, layout = next(iter(frames), None), options.pairs.side_by_side
-    if first is None or (first.calibration is None and layout is None):
+    layout = options.pairs.side_by_side
+    if not frames or (frames[0].calibration is None and layout is None):
         return None
     from rollcli.run.read import read_map, read_views  # only here does a dispatcher decode an image
     from rollcli.stereo.views import matched_shape
 
-    try:
-        if first.right_file:
-            shape = read_views(first, options.frame)[0].shape[:2]
-        else:
-            shape = read_map(first, options.frame).values.shape
-    except InputError:
-        return None  # its row will say so
+    for first in frames[:_TRIED]:
+        try:
+            if first.right_file:
+                shape = read_views(first, options.frame)[0].shape[:2]
+            else:
+                shape = read_map(first, options.frame).values.shape
+            break
+        except InputError:  # its row will say so
+            continue
+    else:
+        return None
     height, width = shape
     if first.calibration is None:
         if width < height and layout == "left-right":

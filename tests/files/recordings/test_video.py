@@ -277,7 +277,7 @@ def test_what_is_no_usable_video_is_told_in_a_line(tmp_path, drive):
         (["--side-by-side"], "name pairs in one way"),
         (["drive.mkv", "--side-by-side", "--left", "a", "--right", "b"], "name pairs in one way"),
         (["odd.avi", "--side-by-side"], "odd.avi: is 101 px wide, which cannot be halved"),
-        (["narrow.mkv", "--side-by-side"], "its views would be 80x120 px, higher than wide"),
+        (["gone.png", "narrow.mkv", "--side-by-side"], ": its views would be 80x120 px, higher than wide"),
         (["noise.mp4", "--side-by-side"], "noise.mp4: is no MP4, MOV, AVI or Matroska file"),
         (["header.mp4", "--side-by-side"], "header.mp4: cannot be opened"),
         (["list.mp4", "--side-by-side"], "list.mp4: is no MP4, MOV, AVI or Matroska file"),
