@@ -33,7 +33,8 @@ def derotate(
     roll : float
         theta of the estimate, radians, from -pi to pi.
     roll_deg : float
-        The same in degrees, in place of `roll`.
+        The same in degrees, in place of `roll`: `image_roll_deg` of an estimate with a calibration whose fx
+        and fy differ; its theta is the rig's.
     expand : bool
         Enlarge the result so that it keeps the corners.
     invalid : iterable of float
