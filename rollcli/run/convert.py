@@ -105,11 +105,11 @@ def _find_rows(frames: Sequence[Frame], options: ConvertOptions) -> Sequence[Row
     if options.result is None:
         return [None] * len(frames)
     rows = _rows_of(frames, options.result, options)
-    metric = isinstance(options, HeightsOptions) and any(row.height_m is not None for row in rows)
-    if metric and not options.running.quiet and any(frame.calibration is None for frame in frames):
+    posed = isinstance(options, HeightsOptions) and any(row.pitch_deg is not None for row in rows)
+    if posed and not options.running.quiet and any(frame.calibration is None for frame in frames):
         say(
-            f"{options.result}: was made with a calibration: give it with --calib to have heights in metres, "
-            "not camera heights"
+            f"{options.result}: was made with a calibration: give it with --calib; without it heights are in "
+            "camera heights, and off where the road has camber and the principal point is not in the middle"
         )
     return rows
 
