@@ -201,11 +201,11 @@ def check_first_size(frames: Sequence[Frame], options: FramesOptions) -> Calibra
                 "estimate --calib, or --focal and --principal-point, of the views as they are"
             )
         return None
+    fitting = first.calibration.for_size(width, height)
     if doubt := first.calibration.seems_of_another_size(width, height):
         _tell([doubt], options)
-        return None
     matched = matched_shape(shape, options.stereo.downscale if first.right_file else 1.0)
-    return first.calibration.for_size(width, height).for_size(*reversed(matched))
+    return fitting.for_size(*reversed(matched))
 
 
 def check_depth(frames: Sequence[Frame], encoding: EncodingOptions) -> None:

@@ -49,9 +49,8 @@ def test_of_a_cropped_map_the_lane_is_the_one_below_the_principal_point(tmp_path
     write_kitti(tmp_path / "map.png", banked_road(2, cropped=200))
     given = ("--focal", "360", "--principal-point", "110,94", "--baseline", "0.5")
     done = rollcli("estimate", "map.png", *given, "-o", "rolls.csv", "--heights", "heights", cwd=tmp_path)
-    assert done.status == 0
     (row,) = rows_of((tmp_path / "rolls.csv").read_text())
-    assert (row["status"], float(row["roll_deg"])) == ("ok", pytest.approx(2, abs=0.02))
+    assert (done.status, row["status"], float(row["roll_deg"])) == (0, "ok", pytest.approx(2, abs=0.02))
 
     again = rollcli("heights", "map.png", "--from", "rolls.csv", *given, "-o", "again", cwd=tmp_path)
     assert again.status == 0, again.err
@@ -133,3 +132,4 @@ def test_the_horizon_is_marked_where_the_road_is_infinitely_far_away(tmp_path):
     for line in (("estimate", *off), ("vdisparity", *off, "-o", "v")):
         told, quiet = (rollcli(*line, *flag, cwd=tmp_path).err for flag in ((), ("-q",)))
         assert ("images of about 601x381 px" in told, quiet) == (True, "")
+    assert rollcli("estimate", *off[:3], "--principal-point", "400,220", cwd=tmp_path).status == 2  # outside
