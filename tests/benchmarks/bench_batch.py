@@ -4,16 +4,16 @@ python tests/benchmarks/bench_batch.py [frames] [rounds]
 """
 
 import os
-import resource
 import statistics
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
+
+from timed import timed
 
 from tests.run_cli import command, environment, road_map, write_kitti
 
@@ -63,10 +63,7 @@ def estimate(folder: Path, jobs: int, path: str = str(ROOT)) -> tuple[float, flo
     # an installed program has its byte code, and so has this one, whatever the environment says
     code = str(folder.with_name("byte_code"))
     kept = environment(PYTHONPATH=path, PYTHONPYCACHEPREFIX=code, PYTHONDONTWRITEBYTECODE="")
-    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    subprocess.run(line, env=kept, check=True)
-    wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
-    return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return timed(line, kept)
 
 
 def without_extras(folder: Path) -> str:

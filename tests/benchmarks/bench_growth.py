@@ -8,8 +8,6 @@ are hard links to maps of 96x72, a thousand to each. Both should be flat: a pixe
 """
 
 import os
-import resource
-import subprocess
 import sys
 import tempfile
 import time
@@ -21,6 +19,8 @@ from numpy.typing import NDArray
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
+
+from timed import timed
 
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.encodings import read_disparity
@@ -72,10 +72,7 @@ def of_a_number(folder: Path, frames: int) -> None:
         else:
             os.link(first, path)
     line = command("estimate", maps, "--recursive", "-q", "-j1", "-o", folder / "rolls.csv", "--overwrite")
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run(line, env=environment(), check=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    _, cpu = timed(line, environment())
     start = time.process_time()
     for path in maps.glob("*/*.png"):
         cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_UNCHANGED)

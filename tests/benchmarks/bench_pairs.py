@@ -11,7 +11,6 @@ others, and 0.8 for the program over 60 pairs.
 """
 
 import math
-import resource
 import subprocess
 import sys
 import time
@@ -30,6 +29,7 @@ import cv2
 import numpy as np
 from matched import match_as_estimated
 from numpy.typing import NDArray
+from timed import timed
 
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.files.formats import read_image
@@ -120,13 +120,8 @@ def report(kind: str, pairs: list[Pair]) -> float:
 def whole_program(first: Pair) -> float:
     """CPU seconds of an estimate of all pairs in the folders of the first one."""
     line = command("estimate", "--left", first.left.parent, "--right", first.right.parent, "-q", "-j", "1")
-    best = math.inf
-    for _ in range(ROUNDS):
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        subprocess.run(line, env=environment(PYTHONPATH=str(ROOT)), stdout=subprocess.DEVNULL, check=True)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        best = min(best, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
-    return best
+    how = {"environment": environment(PYTHONPATH=str(ROOT)), "stdout": subprocess.DEVNULL}
+    return min(timed(line, **how)[1] for _ in range(ROUNDS))
 
 
 def bare_match(pair: Pair, count: int) -> None:

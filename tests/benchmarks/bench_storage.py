@@ -4,16 +4,16 @@ python tests/benchmarks/bench_storage.py [frames] [rounds] [jobs]
 """
 
 import os
-import resource
 import statistics
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
+
+from timed import timed
 
 from tests.object_store import object_store
 from tests.run_cli import command, contents, environment, road_map, write_kitti
@@ -26,10 +26,7 @@ def run(place: str, folder: Path, jobs: int, **variables: str) -> tuple[float, f
     """Wall and CPU seconds of a run over the maps of a place, with de-rotated images."""
     line = command("estimate", f"{place}/maps", "-q", "-j", str(jobs), "-o", f"{place}/rolls.csv")
     line += ["--derotated", f"{place}/level", "--overwrite"]
-    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    subprocess.run(line, env=environment(**variables), cwd=folder, check=True)
-    wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
-    return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return timed(line, environment(**variables), cwd=folder)
 
 
 def upload(folder: Path, bucket: str) -> None:
