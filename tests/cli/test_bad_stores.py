@@ -133,12 +133,10 @@ def test_a_signed_address_works_and_is_shown_nowhere(web, tmp_path):
     maps = [f"{web}/{name}.png{SIGNED}" for name in ("map%201", "broken", "none")]
     line = ("estimate", *maps, "--mask", f"{web}/mask.png{SIGNED}", "-o", "rolls.csv", "--derotated=up", "-v")
     listed = rollcli(*line, "--dry-run", cwd=tmp_path)
-    done = rollcli(*line, cwd=tmp_path)
-    assert done.status == 3
+    done = rollcli(*line, cwd=tmp_path, status=3)
     assert (tmp_path / "rolls.csv").read_text().count(",error,") == 2
     (tmp_path / "web" / "rolls.csv").write_bytes((tmp_path / "rolls.csv").read_bytes())
-    shown = rollcli("rig", f"{web}/rolls.csv{SIGNED}", cwd=tmp_path)
-    assert shown.status == 0, shown.err
+    shown = rollcli("rig", f"{web}/rolls.csv{SIGNED}", cwd=tmp_path, status=0)
     nothing = rollcli("rig", f"{web}/none.csv{SIGNED}", cwd=tmp_path)
     assert "the server answered 404" in nothing.err
     said = [each for ended in (listed, done, shown, nothing) for each in (ended.out, ended.err)]

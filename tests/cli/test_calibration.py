@@ -89,8 +89,7 @@ def test_depth_maps_become_the_disparities_of_their_calibration(maps):
     cv2.imwrite(str(maps / "depth" / "millimetres.png"), millimetres)
 
     depths = ("depth", "--encoding", "depth", "--calib", "calib.txt")
-    done = rollcli("estimate", *depths, "--derotated", "level", cwd=maps)
-    assert done.status == 0
+    done = rollcli("estimate", *depths, "--derotated", "level", cwd=maps, status=0)
     for row in rows_of(done.out):
         found = [float(row[name]) for name in ("roll_deg", "pitch_deg", "height_m")]
         assert found == pytest.approx([2.0, 6.0, HEIGHT], abs=0.002)

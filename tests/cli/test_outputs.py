@@ -56,8 +56,7 @@ def test_the_later_of_two_does_not_replace_what_the_first_wrote(inputs, monkeypa
         written.write_bytes(b"another's")
 
     monkeypatch.setattr(outputs, "check_writes", checked_then_written_by_another)
-    done = rollcli(*line.split(), cwd=inputs)
-    assert done.status == 2
+    done = rollcli(*line.split(), cwd=inputs, status=2)
     assert f"{LATE[line]}: exists already; give --overwrite to replace it" in done.err
     assert written.read_bytes() == b"another's"
     assert rollcli(*line.split(), "--overwrite", cwd=inputs).status == 0

@@ -48,8 +48,7 @@ def pairs(tmp_path_factory):
 
 def test_how_the_right_view_lies_is_found_within_its_interval_and_gated(pairs):
     asked = ("--max-misalignment", "1", "--correction", "c.json", "--overwrite", "--format", "json", "-q")
-    done = rollcli("rig", "off.csv", *asked, cwd=pairs)
-    assert done.status == 4
+    done = rollcli("rig", "off.csv", *asked, cwd=pairs, status=4)
     found = json.loads(done.out)["alignment"]
     assert found["advice"] == "recalibrate"
     for name, truth in TRUTH.items():
@@ -165,8 +164,7 @@ def test_a_correction_is_for_views_of_its_shape_at_any_size(pairs):
         view = cv2.imread(str(pairs / side / "frame_0001.png"))
         cv2.imwrite(str(pairs / f"crop_{side}.png"), view[80:])
     given = ("--left", "crop_left.png", "--right", "crop_right.png", "--align", "use.json")
-    done = rollcli("estimate", *given, cwd=pairs)
-    assert done.status == 3
+    done = rollcli("estimate", *given, cwd=pairs, status=3)
     assert "the correction is for 480x360 px, the views have 480x280" in rows_of(done.out)[0]["message"]
     first = ("--left", "left/frame_0001.png", "--right", "off/frame_0001.png", "--downscale", "1.7")
     assert rollcli("estimate", *first, "--align", "use.json", cwd=pairs).status == 0

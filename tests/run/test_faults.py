@@ -43,8 +43,7 @@ def one_line(done):
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
 @pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
 def test_a_full_device_ends_the_run_with_status_1(maps, jobs):
-    done = rollcli("estimate", "maps", "-o", "/dev/full", "-q", "-j", jobs, cwd=maps)
-    assert done.status == 1
+    done = rollcli("estimate", "maps", "-o", "/dev/full", "-q", "-j", jobs, cwd=maps, status=1)
     assert "/dev/full: cannot be written: no space left on device" in one_line(done)
 
 
@@ -78,8 +77,7 @@ def test_a_full_disk_of_images_keeps_the_rows_before_it(maps, jobs):
         pytest.skip("a small file system cannot be mounted here")
     try:
         arguments = ("estimate", "maps", "-o", "rolls.csv", "-q", "-j", jobs, "--derotated", "disk/upright")
-        done = rollcli(*arguments, cwd=maps)
-        assert done.status == 1
+        done = rollcli(*arguments, cwd=maps, status=1)
         assert "no space left" in one_line(done)
         rows = (maps / "rolls.csv").read_text().splitlines()[1:]
         # of two workers, the second may fill the disk before the first has an image to write

@@ -61,8 +61,7 @@ def test_a_run_killed_again_and_again_ends_in_the_same_bytes_and_leaves_nothing_
         wait_for_rows(folder, rows, run)
         run.kill()
         run.communicate()
-    done = rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder)
-    assert done.status == 3
+    rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, "--resume", cwd=folder, status=3)
     assert results(folder) == results(undisturbed)
 
 
@@ -164,8 +163,7 @@ def test_a_second_run_on_the_same_result_is_refused(folder, monkeypatch):
     wait_for_images(folder, 1, first)
     first.send_signal(signal.SIGSTOP)
     for flag in ("--resume", "--overwrite"):
-        done = rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, flag, cwd=folder)
-        assert done.status == 2
+        done = rollcli("estimate", "maps", "-o", "rolls.csv", *IMAGES, flag, cwd=folder, status=2)
         assert "another run" in done.err
     first.send_signal(signal.SIGCONT)
     first.communicate(timeout=60)
