@@ -12,8 +12,9 @@ import pytest
 import yaml
 
 from rollcli.errors import UsageError
-from rollcli.extras import require_extra
-from tests.run_cli import ROOT, ended, error_of, python, rollcli, write_maps
+from rollcli.extras import EXTRAS, require_extra
+from tests.files.recordings.small_bags import mcap
+from tests.run_cli import ROOT, contents, ended, error_of, python, rollcli
 
 ACTION = yaml.safe_load((ROOT / ".github" / "action" / "action.yml").read_text("utf-8"))
 SAMPLES = ROOT / "sample_data"
@@ -222,10 +223,25 @@ def test_what_all_tests_share_limits_the_threads_of_numpy_before_numpy_loads():
     assert python("import sys, tests.conftest; sys.exit('numpy' in sys.modules)", cwd=ROOT).returncode == 0
 
 
-@pytest.mark.parametrize("missing", ["plotly", "jinja2", "matplotlib"])
-def test_without_the_extra_paper_says_what_to_install_before_any_work(tmp_path, monkeypatch, missing):
+FRAMES = 1
+
+
+@pytest.mark.parametrize(
+    ("line", "missing", "said"),
+    [
+        *(("evaluate paper maps -o out", each, "the extra report") for each in EXTRAS["report"]),
+        ("vdisparity maps --figure pdf -o v", "matplotlib", "rollcli: --figure needs the extra report"),
+        ("estimate s3://maps/a.png", "obstore", "needs the extra storage"),
+        ("estimate s3://maps/", "obstore", "needs the extra storage"),
+        ("estimate drive.mcap", "rosbags", "drive.mcap needs the extra bags"),
+    ],
+)
+def test_what_an_extra_does_is_refused_before_any_work_with_what_to_install(
+    maps, monkeypatch, line, missing, said
+):
+    (maps / "drive.mcap").write_bytes(mcap())
+    before = contents(maps)
     monkeypatch.setitem(sys.modules, missing, None)
-    write_maps(tmp_path / "maps", 1)
-    refusal = rollcli("evaluate", "paper", "maps", "-o", "out", cwd=tmp_path).refused()
-    assert f"needs the extra report: {sys.executable} -m pip install {missing}\n" in refusal
-    assert not (tmp_path / "out").exists()
+    refusal = rollcli(*line.split(), cwd=maps).refused()
+    assert refusal.endswith(f"{said}: {sys.executable} -m pip install {missing}\n")
+    assert contents(maps) == before

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from tests.object_store import upload
-from tests.run_cli import ROOT, contents, road_map, rollcli, write_kitti, write_maps
+from tests.run_cli import contents, road_map, rollcli, write_kitti, write_maps
 from tests.store_proxy import PASS, answer, proxied
 from tests.web_server import file_below, response, web_server
 
@@ -76,11 +76,6 @@ def test_what_a_store_objects_to_is_said_before_any_work(bucket, store, tmp_path
         (["rig", "s3://maps/none.csv"], "there is no such object"),
         (["estimate", *VIEWS, "--align", "s3://maps/none.json"], "there is no such object"),
         (["evaluate", "paper", "maps", "-o", "s3://nowhere/p"], "there is no such bucket"),
-        (["estimate", "s3://maps/run.zip"], "archives are read from local disk: download it first"),
-        (["estimate", "s3://maps/run.tar.gz"], "its members cannot be read one by one"),
-        (["estimate", "https://host/run.tar?key=1"], "host/run.tar: archives are read from local disk"),
-        (["estimate", "http://user:word@127.0.0.1:9/a.png"], "are asked without user and password"),
-        (["rig", "http://user:word@127.0.0.1:9/rolls.csv"], "are asked without user and password"),
     ],
 )
 def test_a_wrong_address_is_one_line_before_any_work(bucket, tmp_path, words, said):
@@ -90,16 +85,6 @@ def test_a_wrong_address_is_one_line_before_any_work(bucket, tmp_path, words, sa
 def test_an_endpoint_without_its_scheme_is_no_address(bucket, tmp_path):
     said = "AWS_ENDPOINT_URL: is no address; write it as https://host, or http://host:9000"
     assert said in refusal(tmp_path, "estimate", "s3://maps/a.png", AWS_ENDPOINT_URL="localhost:9000")
-
-
-@pytest.mark.parametrize("place", ["s3://maps/a.png", "s3://maps/"])
-def test_a_missing_extra_is_named_with_the_line_that_installs_it(tmp_path, place):
-    (tmp_path / "without").mkdir()
-    (tmp_path / "without" / "obstore.py").write_text("raise ImportError('not here')\n")
-    path = f"{tmp_path / 'without'}:{ROOT}"
-    refusal = rollcli("estimate", place, cwd=tmp_path, PYTHONPATH=path).refused()
-    assert "needs the extra storage: " in refusal
-    assert refusal.endswith(" -m pip install obstore\n")
 
 
 def test_an_object_that_may_not_be_read_costs_its_row_alone(bucket, store, tmp_path):

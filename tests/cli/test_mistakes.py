@@ -73,8 +73,9 @@ def folder(tmp_path_factory):
 def test_a_typical_mistake_gets_its_answer(folder, line, status, answer):
     before = contents(folder)
     done = rollcli(*shlex.split(line)[1:], cwd=folder, status=int(status))
-    assert status != "2" or contents(folder) == before
     assert f"rollcli: {answer}" in done.err.splitlines()
+    if status == "2":
+        assert (done.refused(), contents(folder)) == (f"rollcli: {answer}\n", before)
 
 
 def test_the_table_is_read_whole():

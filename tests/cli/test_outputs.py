@@ -1,5 +1,7 @@
 """The images that `estimate` writes: their names, what they never replace, and the later of two runs."""
 
+import shutil
+
 import pytest
 
 from rollcli.run import outputs
@@ -63,12 +65,26 @@ def test_the_later_of_two_does_not_replace_what_the_first_wrote(inputs, monkeypa
     assert written.read_bytes() != b"another's"
 
 
-@pytest.mark.parametrize("several", mostly_slow([2, 3], 2))
-def test_any_number_of_workers_gives_the_same_bytes(tmp_path, several):
-    write_maps(tmp_path / "maps", 12)
-    for jobs in (1, several):
-        images = ["--derotated", f"d{jobs}", "--vdisparity", f"v{jobs}", "--road-mask", f"r{jobs}"]
-        rollcli("estimate", "maps", "-j", str(jobs), "-o", f"{jobs}.csv", *images, cwd=tmp_path)
-    assert (tmp_path / f"{several}.csv").read_bytes() == (tmp_path / "1.csv").read_bytes()
-    for kind in "dvr":
-        assert contents(tmp_path / f"{kind}{several}") == contents(tmp_path / f"{kind}1")
+# commands that workers share in, how many, and the last of what each writes
+SHARED = [
+    ("estimate maps -o rolls.csv --derotated d --vdisparity v --road-mask r", "2", "r/frame11.png"),
+    ("estimate maps -o rolls.csv --derotated d --vdisparity v --road-mask r", "3", "r/frame11.png"),
+    ("derotate maps --from given.csv -o out", "2", "out/frame11.png"),
+    *(
+        (f"vdisparity maps/frame1*.png --figure {kind} -o v", "2", f"v/frame11.{kind}")
+        for kind in ("pdf", "png", "svg")
+    ),
+    ("report given.csv -o page.html", "2", "page.html"),
+]
+
+
+@pytest.mark.parametrize(("line", "several", "written"), mostly_slow(SHARED, SHARED[0]))
+def test_any_number_of_workers_gives_the_same_bytes(tmp_path, line, several, written):
+    one, other = tmp_path / "one", tmp_path / "other"
+    write_maps(one / "maps", 12)
+    rollcli("estimate", "maps", "-o", "given.csv", cwd=one, status=0)
+    shutil.copytree(one, other)
+    rollcli(*line.split(), "-j", "1", cwd=one, status=0)
+    rollcli(*line.split(), "-j", several, cwd=other, status=0)
+    assert written in contents(one)
+    assert contents(one) == contents(other)

@@ -117,11 +117,6 @@ def test_a_url_that_names_no_file_is_that_frames_error_and_writes_nothing(tmp_pa
     assert sorted(contents(tmp_path / "map")) == ["frame0.png"]
 
 
-def test_a_url_that_is_no_address_is_that_frames_error(tmp_path):
-    done = rollcli("estimate", "http://[/a.png", "http://[::1]:x/b.png", cwd=tmp_path, status=3)
-    assert "http://[/a.png: its name in the store or archive names no file" in done.err
-
-
 def test_names_of_objects_are_checked_likewise(tmp_path, bucket, store):
     import boto3
 

@@ -182,14 +182,6 @@ def test_what_cannot_be_written_is_named_in_one_line(tmp_path):
     assert names_in(tmp_path) == ["file", "folder"]
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere")
-def test_a_folder_without_permission_is_named(tmp_path):
-    tmp_path.chmod(0o500)
-
-    with pytest.raises(OutputError, match="permission denied"):
-        write_atomic(tmp_path / "map.png", b"data")
-
-
 @pytest.mark.skipif(os.name == "nt", reason="resource limits are POSIX")
 def test_a_full_disk_leaves_nothing_behind(tmp_path):
     script = (

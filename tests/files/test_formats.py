@@ -44,16 +44,6 @@ def test_a_named_pipe_is_refused_at_once(tmp_path):
         read_bytes(tmp_path / "pipe.png")
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may read everything")
-def test_a_file_without_permission_is_named(tmp_path):
-    path = tmp_path / "map.png"
-    path.write_bytes(b"x")
-    path.chmod(0)
-
-    with pytest.raises(InputError, match=r"map.png: cannot be read: permission denied"):
-        read_bytes(path)
-
-
 IMAGE = np.random.default_rng(0).integers(0, 256, (20, 30, 3), dtype=np.uint8)
 
 

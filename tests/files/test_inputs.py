@@ -66,15 +66,6 @@ def test_a_closed_stdin_is_named(here, monkeypatch):
         find_inputs(["-"])
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may read everything")
-def test_a_folder_without_permission_is_named(here):
-    root = here("maps/f1.png")
-    (root / "maps").chmod(0)
-
-    with pytest.raises(UsageError, match="maps: this folder cannot be read: permission denied"):
-        find_inputs(["maps"])
-
-
 @pytest.fixture
 def deep(here):
     """A folder in a folder, a thousand times, with a map in the last."""

@@ -95,15 +95,6 @@ def test_the_summary_says_options_version_counts_and_the_sign(folder):
     assert f"result written {written:%Y-%m-%d %H:%M} UTC" in text
 
 
-@pytest.mark.slow
-def test_any_number_of_workers_gives_the_same_page(folder):
-    pages = []
-    for jobs in ("1", "2"):
-        assert report(folder, "out/rolls.csv", "-j", jobs, "--overwrite").status == 0
-        pages.append(page_of(folder))
-    assert pages[0] == pages[1]
-
-
 @pytest.mark.parametrize("images", ["out", "out/upright", "out/v"])
 def test_pictures_come_from_the_images_that_estimate_wrote(folder, images):
     shutil.rmtree(folder / "maps")

@@ -51,15 +51,28 @@ def without_privilege():
     return ["setpriv", "--bounding-set=-dac_override,-dac_read_search"]
 
 
-def test_a_file_in_a_folder_that_may_not_be_entered_costs_its_row(maps):
-    write_maps(maps / "locked", 1)
-    (maps / "locked").chmod(0)
-    line = command("estimate", "maps/frame0.png", "locked/frame0.png", "-o", "rolls.csv")
-    done = ended([*without_privilege(), *line], maps)
-    (maps / "locked").chmod(0o700)
-    assert done.returncode == 3, done.stderr
-    assert statuses(maps) == ["error", "ok"]
-    assert "locked/frame0.png: cannot be read: permission denied" in done.stderr
+@pytest.mark.parametrize(
+    ("line", "mode", "status", "said"),
+    [
+        (
+            "estimate maps/frame0.png shut/frame0.png -o rolls.csv",
+            0,
+            3,
+            "shut/frame0.png: cannot be read",
+        ),
+        ("estimate . --recursive", 0, 2, "shut: this folder cannot be read"),
+        ("derotate maps/frame1.png --roll 1 -o shut", 0o500, 1, "shut/frame1.png: cannot be written"),
+    ],
+)
+def test_a_folder_that_may_not_be_entered_read_or_written_is_named(maps, line, mode, status, said):
+    write_maps(maps / "shut", 1)
+    (maps / "shut").chmod(mode)
+    done = ended([*without_privilege(), *command(*line.split())], maps)
+    (maps / "shut").chmod(0o700)
+    assert done.returncode == status, done.stderr
+    assert f"{said}: permission denied" in done.stderr
+    if status == 3:
+        assert statuses(maps) == ["ok", "error"]
 
 
 def test_a_file_that_cannot_be_read_for_a_dying_disk_costs_its_row(maps, monkeypatch):

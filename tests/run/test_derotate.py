@@ -57,14 +57,6 @@ def test_a_map_keeps_its_format_type_and_encoding(tmp_path, form, dtype, encodin
     assert math.degrees(roll) == pytest.approx(0, abs=0.05 + 2 * STEPS[encoding])
 
 
-@pytest.mark.slow
-def test_any_number_of_workers_gives_the_same_files(maps):
-    assert rollcli("estimate", "maps", "-o", "rolls.csv", cwd=maps).status == 0
-    for jobs in ("1", "2"):
-        rollcli("derotate", "maps", "--from", "rolls.csv", "-o", f"out{jobs}", "-j", jobs, cwd=maps)
-    assert contents(maps / "out1") == contents(maps / "out2")
-
-
 @pytest.mark.parametrize("more", [(), ("--expand",)])
 def test_the_matrix_says_where_each_pixel_has_gone(tmp_path, more):
     spots = {(40, 30): 20.0, (120, 90): 40.0, (80, 20): 60.0}  # (u, v), px

@@ -84,11 +84,3 @@ def test_a_momentary_fault_of_the_disk_does_not_keep_a_run_from_resume(parts, pa
 
     assert rollcli(*line, "--resume", cwd=folder).status == 0
     assert contents(folder) == whole
-
-
-def test_a_part_with_a_number_beyond_all_frames_keeps_a_run_from_resume(parts):
-    folder, line = parts
-    for kind, ending in (("", "parquet"), (".inputs", "inputs")):
-        of_run = folder / f"rolls.parquet{kind}"
-        (of_run / f"part-20260131235959.{ending}").write_bytes((of_run / f"part-00000.{ending}").read_bytes())
-    assert "it has 8 rows, and there are 6 frames" in rollcli(*line, "--resume", cwd=folder).refused()

@@ -2,13 +2,12 @@
 
 import math
 import re
-import sys
 import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
 
-from tests.run_cli import contents, road_map, rollcli, rollcli_process, write_kitti
+from tests.run_cli import road_map, rollcli, rollcli_process, write_kitti
 
 
 @pytest.fixture
@@ -61,23 +60,6 @@ def test_a_figure_has_map_and_counts_before_and_after_with_the_roads_curve_where
     centre = 59.5 * np.cos(roll) - 79.5 * np.sin(roll)
     truth = 20 + 0.3 * (centre + row(places[:, 1]) - 59.5 - y.min())
     np.testing.assert_allclose(disparity(places[:, 0]), truth, atol=0.3)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["pdf", "png", "svg"])
-def test_a_figure_is_the_same_each_time_and_needs_no_result(maps, kind):
-    line = ["vdisparity", "maps", "--figure", kind, "-o"]
-    assert rollcli(*line, "one", "-j1", cwd=maps).status == 0
-    assert rollcli(*line, "two", "-j2", cwd=maps).status == 0
-    assert sorted(contents(maps / "one")) == [f"frame{i}.{kind}" for i in range(3)]
-    assert contents(maps / "one") == contents(maps / "two")
-
-
-def test_a_figure_without_the_extra_is_refused_in_one_line_that_says_how_to_install_it(maps, monkeypatch):
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    done = rollcli("vdisparity", "maps", "--figure", "pdf", "-o", "v", cwd=maps)
-    words = f"rollcli: --figure needs the extra report: {sys.executable} -m pip install matplotlib\n"
-    assert (done.status, done.err) == (2, words)
 
 
 @pytest.mark.slow

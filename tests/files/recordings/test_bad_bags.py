@@ -37,15 +37,6 @@ def test_sizes_that_change_within_a_drive_are_told(tmp_path, views):
     assert [row["height"] for row in found] == ["120", "", "100"]
 
 
-def test_without_the_extra_a_line_says_what_to_install(tmp_path):
-    path = write_bag(tmp_path, "drive", "mcap", drive(1)).name
-    (tmp_path / "hidden" / "rosbags").mkdir(parents=True)
-    (tmp_path / "hidden" / "rosbags" / "__init__.py").write_text("raise ModuleNotFoundError(name='rosbags')")
-    said = rollcli("estimate", path, cwd=tmp_path, PYTHONPATH=str(tmp_path / "hidden")).refused()
-    assert f"{path} needs the extra bags: " in said
-    assert "pip install rosbags" in said
-
-
 def test_a_topic_without_messages_is_refused_with_a_line(tmp_path):
     (tmp_path / "drive.mcap").write_bytes(mcap(data=()))
     said = rollcli("estimate", "drive.mcap", "--topic", "/a", cwd=tmp_path).refused()
