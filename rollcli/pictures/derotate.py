@@ -110,10 +110,9 @@ def rotation_matrix(shape: tuple[int, ...], roll: float, *, expand: bool = False
         principal point at matrix (cx, cy, 1).
     """
     cosine, sine = math.cos(roll), math.sin(roll)
-    matrix = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    turn = np.array([[cosine, sine], [-sine, cosine]])
     before, after = ((np.array(each[::-1]) - 1) / 2 for each in (shape, _turned_size(shape, roll, expand)))
-    matrix[:2, 2] = after - matrix[:2, :2] @ before
-    return matrix
+    return np.vstack([np.column_stack([turn, after - turn @ before]), [0.0, 0.0, 1.0]])
 
 
 def _radians(roll: float | None, roll_deg: float | None) -> float:

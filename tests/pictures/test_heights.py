@@ -94,6 +94,8 @@ def test_far_above_a_plane_heights_are_exact_and_need_no_calibration():
     camera = 1 / np.linalg.norm([0.4 / 0.5, 30 / (400 * 0.5)])
     assert np.allclose(heights_over(d, road, rig)[g > 5], camera * (1 - 1 / 2.5), atol=1e-5)
     assert np.isnan(in_heights[g <= 5]).all()
+    faint, _ = road_of(0.2, 0.3, 0.004, 0, 0)
+    assert np.allclose(heights_over(d / 100, faint, None)[g > 5], in_heights[g > 5], atol=1e-6)
 
 
 def test_a_flattening_road_goes_on_straight():

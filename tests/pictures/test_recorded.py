@@ -259,6 +259,7 @@ CASES = {
     "colours": style_sheet,
     "picture of heights": partial(_height_picture, (-0.3, 0.3), "metres"),
     "picture of heights, uneven": partial(_height_picture, (-0.05, 0.4), "camera heights"),
+    "picture of heights, ends near labels": partial(_height_picture, (-0.24, 0.24), "metres"),
     "picture of heights above": partial(_height_picture, (0.1, 0.45), "metres"),
     "picture of heights on a photo": lambda: _height_picture((-0.2, 0.3), "metres", _photo()),
     "picture of heights on grey": lambda: _height_picture(
