@@ -10,7 +10,6 @@ import pytest
 from scipy import ndimage, stats
 
 from rollcli import read_disparity
-from rollcli.errors import UsageError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.interval import Interval, Jackknife, interval_of, jackknife, touch
 from rollcli.estimator.moments import Floats, Grid
@@ -102,12 +101,6 @@ def test_a_slope_that_all_disparities_may_have_widens_it_by_what_it_would_turn(r
     added = math.sqrt(found.ci95**2 - without.ci95**2)
     assert found.theta == without.theta
     assert added == pytest.approx(1.96 * abs(turned[0] - turned[1]) / 2, rel=0.05)
-
-
-@pytest.mark.parametrize("slope_error", [-1e-4, math.nan, math.inf])
-def test_a_slope_error_that_is_none_is_refused(slope_error):
-    with pytest.raises(UsageError, match=r"slope error of .*: give 0 or more px per px"):
-        Request(slope_error=slope_error)
 
 
 def knife(bands=(0.0,), columns=(0.0,), white=0.0, freedom=(5.0, 5.0), **parts):

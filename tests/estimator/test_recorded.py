@@ -189,6 +189,7 @@ ASKED = (
     *({name: "magic"} for name in ("method", "model", "road")),
     *({"lambda0": step} for step in (0.0, math.inf)),
     *({name: angle} for name in ("tolerance", "max_interval") for angle in (0.0, math.inf, math.nan)),
+    *({"slope_error": each} for each in (-1e-4, math.nan, math.inf)),
     {"seed": -1},
     {"mask": np.ones((4, 5))},
     {"max_roll": math.radians(89), "max_interval": 1e-9, "lambda0": 1e-9, "tolerance": 1e-300},

@@ -25,6 +25,7 @@ from rollcli.files.results import (
     format_header,
     format_row,
     parse_rows,
+    part_names,
     read_columns,
 )
 from rollcli.files.search import IMAGE_ENDINGS, Search
@@ -141,11 +142,12 @@ READ = {
     "order": lambda names: sorted(names, key=naming.natural_key),
     "paired": _paired,
     "pairs": _matched,
+    "parts": part_names,
     "result": _result,
     "text": lambda data: _answer(lambda: bounded.as_utf8(data, "x").decode("latin-1")),
     "url": lambda name: _url(name.decode()),
 }
-OF_NAMES = ("elsewhere", "found", "match", "order", "paired", "pairs")
+OF_NAMES = ("elsewhere", "found", "match", "order", "paired", "pairs", "parts")
 
 
 def _read(line):

@@ -14,7 +14,6 @@ from rollcli.files.results import (
     encode_parquet,
     format_header,
     format_row,
-    part_names,
     plain_values,
     read_columns,
     read_result,
@@ -108,16 +107,3 @@ def test_columns_are_those_of_the_rows(tmp_path, form, before):
     assert np.isnan(found.numbers["pitch_deg"]).all()
     assert found.methods == {"gd", "gss"}
     assert found.run == {"rollcli": "1"}
-
-
-def test_parts_have_numbers_and_come_in_their_order():
-    names = ["part-00010.csv", "part-00009.csv", "part-100000.csv", "part-00000.csv"]
-    others = ["part-0001.csv", "part-00001.txt", "xpart-00001.csv", "part-00001.csv.gz", "part-00001"]
-    assert part_names(names + others) == [
-        "part-00000.csv",
-        "part-00009.csv",
-        "part-00010.csv",
-        "part-100000.csv",
-    ]
-    for ending in ("jsonl", "parquet"):
-        assert part_names([f"part-00000.{ending}"]) == [f"part-00000.{ending}"]

@@ -6,7 +6,7 @@ import socket
 
 import pytest
 
-from rollcli.errors import InputError, OutputError, UsageError
+from rollcli.errors import InputError, OutputError
 from rollcli.files import storage
 from rollcli.files.search import objects_behind
 from rollcli.files.stores.locations import is_url
@@ -171,11 +171,3 @@ def test_what_keeps_a_place_from_being_written_or_read_is_said_beforehand(bucket
 def test_what_the_system_objects_to_is_said_in_its_words(path, reason):
     # Pythons word the latter their own way
     assert re.fullmatch(f"map.png: {reason}", error_of(InputError, storage.read_bytes, path, "map.png"))
-
-
-@pytest.mark.parametrize("seconds", ["0", "-1", "nan", "1e6", "x"])
-def test_a_store_waits_for_a_number_of_seconds(monkeypatch, seconds):
-    pytest.importorskip("obstore", reason="obstore, of the extra storage, is not here")
-    monkeypatch.setenv("ROLLCLI_STORE_TIMEOUT", seconds)
-    with pytest.raises(UsageError, match=rf"^ROLLCLI_STORE_TIMEOUT={seconds}: give seconds, such as 60$"):
-        storage.read_bytes(f"s3://waits-{seconds}/x")

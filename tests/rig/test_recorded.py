@@ -84,12 +84,18 @@ RIGS = {
     "alike": lambda: {key: each[:5] for key, each in _columns("all alike").items()},
     "failed": lambda: _columns("all alike") | {"status": ["error"] * 60},
 }
+NO_VALUES = {"roll_deg": (500.0, -90.1), "roll_ci95_deg": (-1.0,), "pitch_deg": (90.5,), "height_m": (-1.5,)}
 NO_ROWS = (
     {"roll_deg": [1.0]},
     {"status": ["ok"]},
     {"roll_deg": [1.0], "status": ["ok", "ok"]},
     {"roll_deg": ["far"], "status": ["ok"]},
     {"roll_deg": [1.0], "status": ["fine"]},
+    *(
+        {"status": ["ok"] * 3, "roll_deg": [1.0, -90.0, 90.0], name: [None, value, 0.5]}
+        for name, values in NO_VALUES.items()
+        for value in values
+    ),
 )
 FOLDERS = {  # of frames, and how many are in each
     "a": {"a": 8},

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from rollcli.errors import InputError, UsageError
+from rollcli.errors import InputError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.request import Request
 from rollcli.files.formats import read_image
@@ -309,12 +309,6 @@ def test_levelling_is_the_inverse_of_what_the_camera_did():
 
     inside = np.s_[12:-12, 12:-12]
     assert np.abs(again[inside].astype(int) - view[inside]).max() <= 2
-
-
-@pytest.mark.parametrize("offset", [-101, 100.5, math.nan])
-def test_an_offset_that_cannot_be_is_refused(offset):
-    with pytest.raises(UsageError, match="vertical-offset"):
-        StereoOptions(vertical_offset=offset)
 
 
 @needs_streets

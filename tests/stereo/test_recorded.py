@@ -15,10 +15,10 @@ from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
 from rollcli.stereo.alignment import level, seen_from_right
 from rollcli.stereo.match import StereoOptions, match_pair
-from rollcli.stereo.misalignment import Misalignment
+from rollcli.stereo.misalignment import Misalignment, advice_of
 from rollcli.stereo.row_fit import ColumnEvidence, column_support
 from tests.odd_views import pair_at, seen_by
-from tests.recorded import recorded_test
+from tests.recorded import made, recorded_test
 
 SIZE = (224, 160)
 
@@ -106,6 +106,27 @@ def _levelled(near):
     return level(cv2.cvtColor(_scene()[1], cv2.COLOR_BGR2GRAY), LIES, near).astype(float)
 
 
+# at the limits of each option, beyond them, and what makes no sense
+OPTIONS = {
+    "num_disparities": (0, 1, 2000, 2001, 64.5),
+    "min_disparity": (-2001, -2000, 2000, 2001, None),
+    "block_size": (-1, 1, 4, 21, 23),
+    "uniqueness": (-1, 0, 99, 100),
+    "speckle_size": (-1, 0, 1_000_000, 1_000_001, 10.0),
+    "speckle_range": (-1, 0, 1000, 1001),
+    "downscale": (0, 1, 64, 65, math.nan),
+    "vertical_offset": (-101, -100, 100, 100.5, math.nan),
+    "mode": ("bm",),
+    "align": ("on",),
+}
+
+
+def _taken(name, value):
+    """The option as it is taken, or why it is not."""
+    found = made(StereoOptions, **{name: value})
+    return found if isinstance(found, str) else getattr(found, name)
+
+
 CASES = {
     "level": partial(_match, _scene),
     "verge": partial(_match, partial(_scene, "verge", 6)),
@@ -143,6 +164,16 @@ CASES = {
     "one image": partial(_match, lambda: (_scene()[0],) * 2),
     "levelled": lambda: [_levelled(None), _levelled(seen_from_right(_NEAR))],
     "seen from the right": lambda: seen_from_right(_NEAR),
+    "options": lambda: {name: [_taken(name, each) for each in given] for name, given in OPTIONS.items()},
+    # each part alone, of either sign, and all of them
+    "advice": lambda: [
+        advice_of(*each)
+        for each in (
+            *np.diag([0.4, 0.2, 0.4, 1.0]),
+            *np.diag([-0.4, -0.2, -0.4, -1.0]),
+            (0.6, -0.2, 0.3, 1.5),
+        )
+    ],
     "lies": lambda: [
         LIES.resized(0.5),
         LIES.times(2.0),

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from rollcli.errors import InputError, UsageError
+from rollcli.errors import InputError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.request import Request
 from rollcli.estimator.road.find import road_plane
@@ -196,25 +196,6 @@ def test_images_too_narrow_to_match_are_refused(shape):
 def test_what_is_no_image_is_refused(image):
     with pytest.raises(InputError, match="cannot be matched"):
         compute_disparity(image, image)
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"block_size": 4},
-        {"downscale": math.nan},
-        {"mode": "bm"},
-        {"align": "on"},
-        {"num_disparities": 64.5},
-        {"speckle_size": 10.0},
-        {"min_disparity": None},
-    ],
-)
-def test_options_that_make_no_sense_are_refused(options):
-    name = next(iter(options)).replace("_", "-")
-
-    with pytest.raises(UsageError, match=name):
-        StereoOptions(**options)
 
 
 @needs_roads
