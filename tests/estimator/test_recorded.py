@@ -194,7 +194,7 @@ ASKED = (
     {"mask": np.ones((4, 5))},
     {"max_roll": math.radians(89), "max_interval": 1e-9, "lambda0": 1e-9, "tolerance": 1e-300},
 )
-NO_MAPS = (np.ones(50), np.ones((5, 5, 3)), np.full((50, 50), "1"))
+NO_MAPS = (np.ones(50), np.ones((5, 5, 3)), np.full((50, 50), "1"), _road(5) * 1e-20, _road(5) * 1e13)
 
 
 def _angle(disparity, mask=None, **asked):

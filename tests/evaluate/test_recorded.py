@@ -159,22 +159,7 @@ def _tables_without_angles():
     return {name: table_csv(table).decode() for name, table in all_tables([found], [], [_times(0.1)]).items()}
 
 
-TRUTHS = (
-    "",
-    "file,roll\na,1\n",
-    "file,roll_deg\n",
-    "file,roll_deg\na,\n",
-    "file,roll_deg\na,1\nb,x\n",
-    "file,roll_deg\na,nan\n",
-    "file,roll_deg\na,1_0\n",
-    "file,roll_deg\na\n",
-    'file,roll_deg\n"a,1\n',
-    "\x89PNG\r\n\x1a\n\x00\xff",
-    "file,roll_deg\na.png,1\nb/a,2\n",
-    *(f"file,roll_deg,{name}\na,1,steep\n" for name in ("pitch_deg", "height_m", "curvature_per_m")),
-    "\ufefffile,roll_deg,pitch_deg,height_m,curvature_per_m\r\na,1,2,1.5,0\r\nc/b.png,-1,3,1.6,0.001\r\n",
-    "file,roll_deg,pitch_deg,height_m,focal_px,baseline_m\na,1,,,\nb,2,3,,300,0.5\nc,3,,2,300,\n",
-)
+TRUTHS = Path(__file__).with_name("truths.txt").read_text("utf-8").partition("\n\n")[2].splitlines()
 
 
 def _known():
@@ -182,8 +167,8 @@ def _known():
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "truth.csv")
         found = [made(read_truth, path)]
-        for text in TRUTHS:
-            path.write_bytes(text.encode())
+        for text in ("", *TRUTHS):
+            path.write_bytes(text.encode().decode("unicode_escape").encode())
             found.append(made(read_truth, path))
     return json.loads(json.dumps(found, default=str).replace(folder, "."))
 

@@ -14,9 +14,10 @@ from rollcli.estimator.road.find import road_plane
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.spec import FrameSpec
 from rollcli.stereo.alignment import level, seen_from_right
-from rollcli.stereo.match import StereoOptions, match_pair
+from rollcli.stereo.match import StereoOptions, compute_disparity, match_pair
 from rollcli.stereo.misalignment import Misalignment, advice_of
 from rollcli.stereo.row_fit import ColumnEvidence, column_support
+from rollcli.stereo.views import prepare_views
 from tests.odd_views import pair_at, seen_by
 from tests.recorded import made, recorded_test
 
@@ -121,6 +122,15 @@ OPTIONS = {
 }
 
 
+GREY = np.ones((4, 5), np.uint8)
+NO_VIEWS = (
+    *((np.ones(shape, kind),) * 2 for shape, kind in (((4, 5), "i2"), ((4, 5), "f4"), ((4, 5, 3), "i4"))),
+    *((np.ones((4, 5, count), np.uint8),) * 2 for count in (1, 2, 4)),
+    *((GREY, np.ones(shape, np.uint8)) for shape in ((4, 6, 3), (3, 5, 3))),
+    (np.zeros((0, 100), np.uint8),) * 2,
+)
+
+
 def _taken(name, value):
     """The option as it is taken, or why it is not."""
     found = made(StereoOptions, **{name: value})
@@ -165,6 +175,11 @@ CASES = {
     "levelled": lambda: [_levelled(None), _levelled(seen_from_right(_NEAR))],
     "seen from the right": lambda: seen_from_right(_NEAR),
     "options": lambda: {name: [_taken(name, each) for each in given] for name, given in OPTIONS.items()},
+    "no views": lambda: [made(prepare_views, *each) for each in NO_VIEWS],
+    "narrow views": lambda: [
+        made(compute_disparity, *(np.zeros(shape, np.uint8),) * 2)
+        for shape in ((1, 1), (2, 3), (5, 20), (300, 10))
+    ],
     # each part alone, of either sign, and all of them
     "advice": lambda: [
         advice_of(*each)

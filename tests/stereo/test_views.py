@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from rollcli.errors import InputError
 from rollcli.stereo.views import (
     as_bright,
     as_clear,
@@ -77,24 +76,6 @@ def test_rows_of_an_odd_view_lie_at_even_distances(factor, shape):
         assert small.shape == matched_shape(shape, factor)
         seen = np.indices(small.shape)[0] * apart + (apart - 1) / 2 - shape[0] + 256
         np.testing.assert_allclose(small[-50:-1], seen[-50:-1], atol=0.6)  # the last row may stand for fewer
-
-
-GREY, NOTHING = np.ones((4, 5), np.uint8), np.zeros((0, 100), np.uint8)
-ODD = (((4, 5), "i2"), ((4, 5), "f4"), ((4, 5, 4), "u1"), ((4, 5, 1), "u1"), ((4, 5, 3), "i4"))
-
-
-@pytest.mark.parametrize(
-    ("left", "right", "said"),
-    [
-        *((np.ones(*odd), np.ones(*odd), "grey and BGR images of 8 and 16 bits can") for odd in ODD),
-        (GREY, np.ones((4, 6, 3), np.uint8), "5x4 and 6x4"),
-        (GREY, np.ones((3, 5, 3), np.uint8), "5x4 and 5x3"),
-        (NOTHING, NOTHING, "no pixels: 100x0"),
-    ],
-)
-def test_what_is_no_pair_of_views_is_named_and_refused(left, right, said):
-    with pytest.raises(InputError, match=said):
-        prepare_views(left, right)
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.float32])
