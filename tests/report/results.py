@@ -19,3 +19,12 @@ def row(
 def write_result(path: Path, rows, form="csv") -> None:
     """A result without a record of its run."""
     path.write_bytes(b"".join([format_header(form), *(format_row(each, form) for each in rows)]))
+
+
+OF_ONE_KIND = (
+    [row("a.png", 1.0, 0.1)],
+    [row("a.png", 0.0, 0.0)] * 500,
+    [row("a.png", None)] * 30,
+    [row("a.png", 3.0, None, "suspect")],
+    [row("a.png", 3.0, None)] * 3,
+)

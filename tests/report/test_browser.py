@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.page_picture import PICTURE, SHOWN, WIDTH, photograph
-from tests.report.results import row, write_result
+from tests.report.results import OF_ONE_KIND, row, write_result
 from tests.run_cli import road_map, rollcli, write_kitti, write_maps
 
 pytestmark = pytest.mark.slow
@@ -94,15 +94,7 @@ def test_the_charts_are_there(seen):
     assert [text for text in ("95 % interval", "roll", "failed") if text not in legend] == []
 
 
-@pytest.mark.parametrize(
-    "rows",
-    [
-        [row("a.png", None)] * 30,
-        [row("a.png", 3.0, None, "suspect")],
-        [row("a.png", 3.0, None)] * 3,
-        [row("a.png", 0.0, 0.0)] * 500,
-    ],
-)
+@pytest.mark.parametrize("rows", OF_ONE_KIND)
 def test_a_result_of_one_kind_of_frame_has_a_page_without_complaint(opened, tmp_path, rows):
     page = opened(url=page_of(tmp_path, rows))
     assert page.locator("#roll .legendtext").count() >= 1

@@ -14,7 +14,7 @@ from rollcli.report import figures
 from rollcli.report.charts import all_charts
 from rollcli.report.figures import chart_file, stills
 from rollcli.rig.drive.assess import assess_rig
-from tests.report.results import row
+from tests.report.results import OF_ONE_KIND, row
 from tests.slow import mostly_slow
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -129,12 +129,6 @@ def test_files_are_the_same_each_time_whatever_a_user_has_set_and_leave_that_alo
 
 
 MIXED = [row("a.png", 1.0, 0.1), row("b.png", -80.0, 20.0, "suspect"), row("c.png", 1.1, 0.1)]
-OF_ONE_KIND = (
-    [row("a.png", 1.0, 0.1)],
-    [row("a.png", 0.0, 0.0)] * 500,
-    [row("a.png", None)] * 3,
-    [row("a.png", 3.0, None, "suspect")],
-)
 
 
 @pytest.mark.parametrize("rows", mostly_slow([MIXED, *OF_ONE_KIND], MIXED))
