@@ -154,10 +154,9 @@ def test_a_crop_that_leaves_nothing_is_said(shape):
 def test_an_image_that_was_not_read_is_said():
     image = np.zeros((100, 200), np.uint8)
     for call in (rollcli.compute_disparity, rollcli.estimate_pair):
-        with pytest.raises(rollcli.InputError, match="left image is None"):
-            call(None, image)
-        with pytest.raises(rollcli.InputError, match="right image is None"):
-            call(image, None)
+        for left, right, said in ((None, image, "left image is None"), (image, None, "right image is None")):
+            with pytest.raises(rollcli.InputError, match=said):
+                call(left, right)
         with pytest.raises(rollcli.InputError, match="right image is no array"):
             call(image, "right.png")
     estimate = rollcli.estimate_roll(rollcli.read_disparity(MAP))

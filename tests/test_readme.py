@@ -19,7 +19,6 @@ PAGES = [
     *sorted((ROOT / ".github").glob("*.md")),
     *sorted((ROOT / "rollcli").rglob("README.md")),
 ]
-needs_make = pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
 
 
 def test_the_tables_of_options_are_those_of_the_commands():
@@ -93,6 +92,8 @@ def pairs(tmp_path, made):
 
 
 def make(folder, target="rolls.html"):
+    if shutil.which("make") is None:
+        pytest.skip("make is not installed")
     variables = environment()
     for inherited in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS"):  # of the make that runs the tests
         variables.pop(inherited, None)
@@ -105,7 +106,6 @@ def touch(path):
 
 
 @pytest.mark.slow
-@needs_make
 def test_its_makefile_makes_a_page_from_pairs_and_then_has_nothing_to_do(pairs):
     assert (pairs / "rolls.html").read_text("utf-8").count("maps/frame_0003.png") >= 1
     again = make(pairs)
@@ -114,7 +114,6 @@ def test_its_makefile_makes_a_page_from_pairs_and_then_has_nothing_to_do(pairs):
 
 
 @pytest.mark.slow
-@needs_make
 def test_its_makefile_does_anew_what_a_changed_pair_asks_for(pairs):
     touch(pairs / "right" / "frame_0002.png")
     ran = [line.split()[:2] for line in make(pairs).stdout.splitlines()]
@@ -122,7 +121,6 @@ def test_its_makefile_does_anew_what_a_changed_pair_asks_for(pairs):
 
 
 @pytest.mark.slow
-@needs_make
 def test_its_makefile_stops_at_a_pair_that_cannot_be_matched(pairs):
     (pairs / "right" / "frame_0002.png").write_bytes(b"no image")
     before = (pairs / "rolls.csv").read_bytes()
@@ -135,7 +133,6 @@ def test_its_makefile_stops_at_a_pair_that_cannot_be_matched(pairs):
 
 
 @pytest.mark.slow
-@needs_make
 def test_its_makefile_stops_at_a_map_without_an_angle(pairs):
     (pairs / "maps" / "frame_0001.png").write_bytes(b"no map")
     for _ in range(2):
@@ -147,7 +144,6 @@ def test_its_makefile_stops_at_a_map_without_an_angle(pairs):
 
 
 @pytest.mark.slow
-@needs_make
 def test_its_makefile_leaves_out_the_map_of_a_pair_that_is_gone(pairs):
     for side in ("left", "right"):
         (pairs / side / "frame_0002.png").unlink()

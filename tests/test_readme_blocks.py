@@ -23,7 +23,7 @@ from tests.run_cli import (
     write_kitti,
     write_program,
 )
-from tests.test_readme import PAGES, README, make, needs_make
+from tests.test_readme import PAGES, README, make
 
 COMMANDS = dict(commands())
 BLOCKS = [text for _, text in re.findall(r"^```(\w*)\n(.*?)^```", README, flags=re.M | re.S)]
@@ -192,7 +192,6 @@ def test_what_the_result_says_of_the_rig(tmp_path):
     assert "roll" in against.out
 
 
-@needs_make
 def test_the_rule_of_a_makefile_accepts_frames_without_an_angle(tmp_path):
     maps(tmp_path / "maps", "frame_0001.png", "frame_0002.png")
     (tmp_path / "maps" / "frame_0003.png").write_bytes(b"no map")
