@@ -29,6 +29,7 @@ from tests.run_cli import (
     road_map,
     rollcli,
     started,
+    wait_for_files,
     wait_until,
     write_maps,
     write_pair,
@@ -216,7 +217,7 @@ frame_task.run_frame = noted
 """
 
 
-def test_a_worker_of_another_version_that_joins_later_gets_no_work_and_a_line_says_so(
+def test_a_worker_of_another_version_that_joins_later_gets_no_work_also_when_all_others_are_new(
     local, far, tmp_path, cluster_here, scheduler, workers
 ):
     odd = tmp_path / "odd"
@@ -228,13 +229,19 @@ def test_a_worker_of_another_version_that_joins_later_gets_no_work_and_a_line_sa
     wait_for_images(far, run)
     joined_late = cluster_here.dask("worker", odd, scheduler, *ONE_PROCESS, "--preload", "preload.py")
     try:
+        said = next(line for line in run.stderr if "gets no work" in line)
+        # what is in hand some frames later is for these two alone
+        wait_for_files(far, "v/[!.]*.png", len([*far.glob("v/*.png")]) + 20, run)
+        for worker in [*workers]:
+            end(worker)
+        cluster_here.workers()
         _, err = run.communicate(timeout=300)
     finally:
         end(joined_late)
     assert run.returncode == 3, err
-    (said,) = [line for line in err.splitlines() if "gets no work" in line]
+    assert "gets no work" not in err
     assert said.startswith("rollcli: worker tcp://")
-    assert said.endswith(f": has rollcli 0.0, this is {__version__}; it gets no work")
+    assert said.endswith(f": has rollcli 0.0, this is {__version__}; it gets no work\n")
     assert not (odd / "worked").exists()
     assert len((far / "rolls.csv").read_text().splitlines()) == 1 + FRAMES + 400
 
