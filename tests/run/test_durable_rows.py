@@ -3,6 +3,7 @@
 import os
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -55,11 +56,14 @@ def add(output, frame, position, row, line, status="ok"):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows forces no folders")
-def test_a_row_is_written_after_its_images_and_their_folder_are_on_the_disk(tmp_path, synced):
-    file, plan = WatchedFile(synced), plan_of(tmp_path, 40)
+def test_a_row_is_written_after_its_images_and_their_folder_are_on_the_disk(tmp_path, synced, monkeypatch):
+    now, file, plan = [100.0], WatchedFile(synced), plan_of(tmp_path, 40)
+    monkeypatch.setattr("rollcli.run.result.time", SimpleNamespace(monotonic=lambda: now[0]))
     output = FileOutput(file, WatchedFile([]), RunRecord(plan), KeptRows(plan))
     for number, frame in enumerate(plan.frames):
+        now[0] += 0.06
         add(output, frame, number, b"%d " % number, b"read")
+        assert len(file.rows) == (number + 1) // 17 * 17  # together, each second
     output.commit()
     assert list(file.rows) == [b"%d" % number for number in range(40)]
     for frame, forced in zip(plan.frames, file.rows.values(), strict=True):
