@@ -139,7 +139,7 @@ def test_numbers_in_three_channels_are_read_and_written_back(tmp_path):
     assert "is no RGB PNG" in rollcli("estimate", "grey.png", *given, cwd=tmp_path).out
 
 
-def test_an_exr_is_read_where_opencv_reads_it_and_else_a_line_says_what_to_do():
+def test_an_exr_is_read_where_opencv_reads_it_and_else_a_line_says_what_to_do(monkeypatch):
     header = b"\x76\x2f\x31\x01\x02\0\0\0dataWindow\0box2i\0\x10\0\0\0"
     for corners, reason in (
         ((0, 0, 9, 9), "save it as TIFF"),
@@ -148,6 +148,13 @@ def test_an_exr_is_read_where_opencv_reads_it_and_else_a_line_says_what_to_do():
     ):
         with pytest.raises(InputError, match=reason):
             decode_stored(header + np.array(corners, "<i4").tobytes() + bytes(100), "map")
+    grey, whole = disparity_map().astype(np.float32), header + bytes(8) + b"\x09\0\0\0" * 2
+    seen = iter([np.dstack([grey] * 3), np.dstack([grey, grey, 0 * grey])])
+    monkeypatch.setattr("rollcli.files.codecs.pictures.decoded_by_opencv", lambda *_: (next(seen), None))
+    np.testing.assert_array_equal(decode_stored(whole, "map").values, grey)  # as some write one channel
+    with pytest.raises(InputError, match="is an EXR of 3 channels; a disparity map has one"):
+        decode_stored(whole, "map")
+    monkeypatch.undo()
     try:
         data = encode_stored(disparity_map().astype(np.float32), "exr")
     except Exception as error:  # noqa: BLE001 (as this OpenCV was built)

@@ -265,6 +265,11 @@ CASES = {
         for name, data in FILES.items()
         if name != "picture.jpg"  # libjpeg rounds in more than one way
     },
+    # of the largest size, and by a space longer
+    "npy: long headers": lambda: [
+        READ["npy"](b"{'descr': '<f4', 'fortran_order': False, 'shape': (5, 5)".rjust(size))
+        for size in (10_000, 10_001)
+    ],
     "image: a header without end": partial(READ["image"], b"P5\n#%s\n2 2\n255\n1234" % (b"x" * 3000)),
     # a compressed file is as long as this zlib makes it
     **{

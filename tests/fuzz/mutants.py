@@ -39,7 +39,7 @@ FURTHER = {
     "files": (
         "run/test_recorded cli/test_recorded run/test_update run/test_resume run/test_retry_failed "
         "run/test_two_runs run/test_result_parts cli/test_frames cli/test_outputs cli/test_help "
-        "cli/test_urls cli/test_buckets cli/test_bad_stores"
+        "cli/test_urls cli/test_buckets cli/test_bad_stores pictures/test_recorded"
     ),
     "pictures": "run/test_recorded run/test_derotate run/test_vdisparity cli/test_heights",
     "rig": "cli/test_recorded cli/test_calibration run/test_diagnosis",

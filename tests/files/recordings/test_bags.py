@@ -257,6 +257,8 @@ def test_python_iterates_the_views_of_a_bag(tmp_path):
     for right, times_focal in (("/b/rect", 22.4 + 168 - 16 * 0.001), ("/c/rect", 22.4 - 16 * 0.005)):
         (frame,) = package.open_recording(path, left_topic="/a/rect", right_topic=right)
         assert frame.calibration.baseline == pytest.approx(times_focal / 350)
+    (frame,) = package.open_recording(path, left_topic="/a/rect", right_topic="/grey")
+    assert frame.calibration.baseline is None
     late = {"left_topic": "/rgb", "right_topic": "/late"}
     assert len(list(package.open_recording(path, **late, sync_tolerance=0.01))) == 1
     with pytest.raises(UsageError, match="are within 8 ms"):

@@ -215,11 +215,12 @@ def test_a_pair_of_videos_of_which_one_is_cut_off_uses_what_both_have(tmp_path, 
         assert (again.status, len(rows(again.out)), rows(again.out)[-1]) == (3, len(found), found[-1])
 
 
-def test_an_interrupted_run_over_a_video_is_resumed_to_the_same_bytes(tmp_path, drive):
-    path = write_video(tmp_path / "drive.mkv", beside(drive[2]), "MJPG")
+@pytest.mark.parametrize("name", ["drive.mkv", "drive.mp4"])
+def test_an_interrupted_run_over_a_video_is_resumed_to_the_same_bytes(tmp_path, drive, name):
+    path = write_video(tmp_path / name, beside(drive[2]), "MJPG")
     damaged = packets_of(path)[1].rstrip(b"\0")  # gives no frame: one behind it takes its number
     path.write_bytes(path.read_bytes().replace(damaged, bytes(len(damaged))))
-    given = ["estimate", "drive.mkv", "--side-by-side", "-o", "rolls.csv"]
+    given = ["estimate", name, "--side-by-side", "-o", "rolls.csv"]
     assert rollcli(*given, "-j", "1", cwd=tmp_path).status == 3
     inputs = (tmp_path / "rolls.csv.inputs").read_bytes()
     whole = keep_rows(tmp_path / "rolls.csv", 2)
