@@ -14,10 +14,11 @@ from itertools import count
 import pytest
 
 from rollcli import __version__
-from rollcli.errors import UsageError
+from rollcli.errors import UsageError, WorkerError
 from rollcli.files.results import ALIGNMENT_COLUMNS
 from rollcli.files.storage import list_names
 from rollcli.run.workers import cluster
+from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.cluster import check_scheduler, probe, scheduler_address
 from tests.in_process import run_here
 from tests.object_store import joined, objects_below, upload
@@ -367,6 +368,15 @@ def test_a_scheduler_is_named_by_its_file_too(workers_here, tmp_path):
     check_scheduler(str(file))
     assert scheduler_address("tcp://far:8786") == "tcp://far:8786"
     assert scheduler_address("far:8786") == "far:8786"
+
+
+def test_a_result_that_is_asked_for_once_the_connection_is_lost_says_so(workers_here):
+    executor = cluster.ClusterExecutor(workers_here.scheduler_address, Work(str, str), Workers(2))
+    future = executor.submit([1])
+    wait_until(future.done)
+    executor._client.close()
+    with pytest.raises(WorkerError, match="the connection to the scheduler is lost"):
+        future.result()
 
 
 @pytest.mark.parametrize(
