@@ -1,9 +1,13 @@
-"""Which cases of a test every change runs, and which `make test-all` alone."""
+"""Which cases of a test every change runs, and which `make test-all` alone; which examples are drawn."""
 
 from collections.abc import Iterable
 from typing import Any
 
+import hypothesis
 import pytest
+
+# the same examples wherever the same modules are loaded, however busy the machine
+repeatable = hypothesis.settings(derandomize=True, max_examples=60, database=None)
 
 
 def mostly_slow(cases: Iterable[Any], *quick: Any) -> list[Any]:

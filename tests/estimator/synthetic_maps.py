@@ -3,15 +3,11 @@
 import math
 
 import numpy as np
-from hypothesis import settings
 from hypothesis import strategies as st
 
 from rollcli.estimator.energy import Energy, Terms
 from rollcli.estimator.moments import map_moments
 from rollcli.rig.calibration import Calibration
-
-# the same examples wherever the same modules are loaded, however busy the machine
-repeatable = settings(derandomize=True, max_examples=60, database=None)
 
 
 def turned(roll, pitch):

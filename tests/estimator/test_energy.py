@@ -9,14 +9,8 @@ from hypothesis import strategies as st
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.solvers.exact import exact
-from tests.estimator.synthetic_maps import (
-    at_each,
-    bent_road,
-    degrees_apart,
-    energy_of,
-    random_maps,
-    repeatable,
-)
+from tests.estimator.synthetic_maps import at_each, bent_road, degrees_apart, energy_of, random_maps
+from tests.slow import repeatable
 
 ANGLES = np.linspace(-math.pi / 2, math.pi / 2, 181)
 angles = st.floats(-math.pi / 2, math.pi / 2)

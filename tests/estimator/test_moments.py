@@ -10,7 +10,8 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.moments import CheckedMap, map_moments, point_moments, require_pixels
 from rollcli.estimator.request import METHODS, Request
-from tests.estimator.synthetic_maps import bent_road, random_maps, repeatable
+from tests.estimator.synthetic_maps import bent_road, random_maps
+from tests.slow import repeatable
 
 DEGREES_4 = [(i, j) for i in range(5) for j in range(5 - i)]
 DEGREES_2 = [(i, j) for i in range(3) for j in range(3 - i)]

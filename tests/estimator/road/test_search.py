@@ -11,7 +11,7 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.simulate.spec import FrameSpec
 from tests.estimator.road.test_surface import CAMERA_HEIGHT, disparity_of
-from tests.estimator.synthetic_maps import repeatable
+from tests.slow import repeatable
 from tests.true_disparity import true_disparity
 
 

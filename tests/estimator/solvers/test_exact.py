@@ -10,14 +10,8 @@ from hypothesis import strategies as st
 from rollcli.errors import EstimationError
 from rollcli.estimator.solvers.exact import certify, exact, minima, zeros
 from rollcli.estimator.solvers.solution import Solution
-from tests.estimator.synthetic_maps import (
-    at_each,
-    bent_road,
-    degrees_apart,
-    energy_of,
-    random_maps,
-    repeatable,
-)
+from tests.estimator.synthetic_maps import at_each, bent_road, degrees_apart, energy_of, random_maps
+from tests.slow import repeatable
 
 STEP = math.pi / 2048
 DENSE = np.arange(2048) * STEP - math.pi / 2 + STEP

@@ -14,14 +14,8 @@ from rollcli.estimator.solvers.golden_section import golden_section
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
 from rollcli.estimator.solvers.solution import SolverStatus
 from rollcli.evaluate.experiments import Textbook
-from tests.estimator.synthetic_maps import (
-    at_each,
-    bent_road,
-    degrees_apart,
-    energy_of,
-    random_maps,
-    repeatable,
-)
+from tests.estimator.synthetic_maps import at_each, bent_road, degrees_apart, energy_of, random_maps
+from tests.slow import repeatable
 
 
 @repeatable
