@@ -221,6 +221,8 @@ frame_task.run_frame = noted
 def test_a_worker_of_another_version_that_joins_later_gets_no_work_also_when_all_others_are_new(
     local, far, tmp_path, cluster_here, scheduler, workers
 ):
+    import distributed
+
     odd = tmp_path / "odd"
     odd.mkdir()
     (odd / "preload.py").write_text(ODD)
@@ -233,9 +235,13 @@ def test_a_worker_of_another_version_that_joins_later_gets_no_work_also_when_all
         said = next(line for line in run.stderr if "gets no work" in line)
         # what is in hand some frames later is for these two alone
         wait_for_files(far, "v/[!.]*.png", len([*far.glob("v/*.png")]) + 20, run)
-        for worker in [*workers]:
+        gone = [*workers]
+        workers.clear()
+        with distributed.Client(scheduler) as client:
+            cluster_here.workers()
+            client.wait_for_workers(5, timeout=60)
+        for worker in gone:
             end(worker)
-        cluster_here.workers()
         _, err = run.communicate(timeout=300)
     finally:
         end(joined_late)
