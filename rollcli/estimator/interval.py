@@ -39,8 +39,8 @@ class Jackknife:
     freedom : tuple of float
         Degrees of freedom of theta's change over bands and over columns.
     uneven : float
-        How far the road's patches lie over or under its parabola, root mean square, over the width of the
-        view where it is nearest: an angle, radians.
+        How far the road's patches lie over or under its parabola, root mean square, over the root of the
+        view's width where it is nearest; both in camera heights.
     hidden : float
         By how much wider the view is where the lane's road is nearest than at the map's lower border,
         camera heights.
@@ -173,7 +173,7 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
         columns=changes[tuning.groups :, :_CAMBER],
         white=white[:4, :4],
         freedom=(_freedom(bands), _freedom(columns)),
-        uneven=uneven / (width_at_1 / nearest),
+        uneven=uneven / math.sqrt(width_at_1 / nearest),
         hidden=width_at_1 * (1 / in_lane - 1 / max(border, in_lane)),
         bend=abs(model.camber * float(bulge[_THETA])),
         camber=_camber(model, prior_share, changes[:, _CAMBER]) if cambered else None,
