@@ -231,7 +231,7 @@ def test_the_unevenness_of_waves_is_theirs_and_that_of_noise_is_none():
         estimate_roll(plane * (1 + height) + noise).tangent.jackknife.uneven for height in (waves, 0)
     )
     view = 400 * 0.2 / plane.max()
-    assert 0.4 < rough * view / np.sqrt(np.mean(waves**2)) < 1.2
+    assert 0.4 < rough * math.sqrt(view / np.mean(waves**2)) < 1.2
     assert smooth < 0.15 * rough
 
 
