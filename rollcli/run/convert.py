@@ -105,8 +105,9 @@ def _find_rows(frames: Sequence[Frame], options: ConvertOptions) -> Sequence[Row
     if options.result is None:
         return [None] * len(frames)
     rows = _rows_of(frames, options.result, options)
-    posed = isinstance(options, HeightsOptions) and any(row.pitch_deg is not None for row in rows)
-    if posed and not options.running.quiet and any(frame.calibration is None for frame in frames):
+    posed = (frame for frame, row in zip(frames, rows, strict=True) if row.pitch_deg is not None)
+    lacking = isinstance(options, HeightsOptions) and any(frame.calibration is None for frame in posed)
+    if lacking and not options.running.quiet:
         say(
             f"{options.result}: was made with a calibration: give it with --calib; without it heights are in "
             "camera heights, and off where the road has camber and the principal point is not in the middle"

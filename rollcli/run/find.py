@@ -1,5 +1,6 @@
 """Find the frames that a user named, and the calibration of each."""
 
+import contextlib
 import glob
 import itertools
 import os
@@ -175,21 +176,19 @@ def check_first_size(frames: Sequence[Frame], options: FramesOptions) -> Calibra
     UsageError
         So it is; or views side by side seem squeezed, and no calibration says that they are not.
     """
-    layout = options.pairs.side_by_side
-    if not frames or (frames[0].calibration is None and layout is None):
+    layout, tried = options.pairs.side_by_side, frames[:_TRIED]
+    if layout is None and all(frame.calibration is None for frame in tried):
         return None
     from rollcli.run.read import read_map, read_views  # only here does a dispatcher decode an image
     from rollcli.stereo.views import matched_shape
 
-    for first in frames[:_TRIED]:
-        try:
+    for first in tried:
+        with contextlib.suppress(InputError):  # its row will say so
             if first.right_file:
                 shape = read_views(first, options.frame)[0].shape[:2]
             else:
                 shape = read_map(first, options.frame).values.shape
             break
-        except InputError:  # its row will say so
-            continue
     else:
         return None
     height, width = shape

@@ -39,13 +39,8 @@ def verdict(disparity):
     return f"{estimate.status}: {estimate.message}"
 
 
-def says_no_road(found):
-    reasons = (
-        "the plane ends near ahead",
-        "is closed off",
-        "the view is as narrow",
-        "the roll is at its bound",
-    )
+def says_no_road(found, *further):
+    reasons = ("the plane ends near ahead", "the plane is closed off", "the view is as narrow", *further)
     return found.startswith("no road: ") or (
         found.startswith("suspect: ") and any(reason in found for reason in reasons)
     )
@@ -173,7 +168,8 @@ def test_a_plane_that_grows_downward_is_not_said_to_grow_nowhere(roll_deg):
 
 @pytest.mark.parametrize("name", sorted(no_road()))
 def test_a_frame_without_a_road_is_refused_or_suspect_and_says_why(name):
-    assert says_no_road(verdict(no_road()[name]))
+    further = ["the roll is at its bound"] if name == "a map upside down" else []
+    assert says_no_road(verdict(no_road()[name]), *further)
 
 
 def test_a_plane_on_which_no_pixel_lies_is_no_road():
