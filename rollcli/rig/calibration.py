@@ -1,6 +1,7 @@
 """The calibration of a rectified stereo pair, and the numbers that win over its file."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -172,7 +173,7 @@ class Calibration:
             return replace(self, width=width, height=height)
         if (width, height) == (self.width, self.height):
             return self
-        if not _one_factor(width, self.width, height, self.height):
+        if not one_factor((width, height), (self.width, self.height)):
             raise UsageError(
                 f"{self.source}: the calibration is for {self.width}x{self.height} px, the map has "
                 f"{width}x{height}: give the calibration of this size; only a scaled image is allowed for"
@@ -215,9 +216,9 @@ def require_calibration(calibration: object) -> None:
         raise UsageError(f"what is of type {kind} is no calibration: give rollcli.read_calibration(path)")
 
 
-def _one_factor(width: int, of_width: int, height: int, of_height: int) -> bool:
-    """Whether one factor makes a size of another, rounded to whole pixels."""
-    sides = ((width, of_width), (height, of_height))
+def one_factor(size: Sequence[int], of_size: Sequence[int]) -> bool:
+    """Whether one factor makes a size, width and height in pixels, of another, rounded to whole pixels."""
+    sides = tuple(zip(size, of_size, strict=True))
     return any(
         max((side + below) / of for side, of in sides) < min((side + below + 1) / of for side, of in sides)
         for below in _ROUNDINGS

@@ -179,19 +179,21 @@ def check_first_size(frames: Sequence[Frame], options: FramesOptions) -> Calibra
     layout, tried = options.pairs.side_by_side, frames[:_TRIED]
     if layout is None and all(frame.calibration is None for frame in tried):
         return None
-    from rollcli.run.read import read_map, read_views  # only here does a dispatcher decode an image
+    from rollcli.run.read import read_map, read_views, size_of_images  # only here are images decoded
     from rollcli.stereo.views import matched_shape
 
     for first in tried:
         with contextlib.suppress(InputError):  # its row will say so
+            matched: tuple[int, ...]
             if first.right_file:
-                shape = read_views(first, options.frame)[0].shape[:2]
+                height, width = read_views(first, options.frame)[0].shape[:2]
+                matched = matched_shape((height, width), options.stereo.downscale)
             else:
-                shape = read_map(first, options.frame).values.shape
+                stored = read_map(first, options.frame)
+                matched, (width, height) = stored.values.shape, size_of_images(stored)
             break
     else:
         return None
-    height, width = shape
     if first.calibration is None:
         if width < height and layout == "left-right":
             raise UsageError(
@@ -203,7 +205,6 @@ def check_first_size(frames: Sequence[Frame], options: FramesOptions) -> Calibra
     fitting = first.calibration.for_size(width, height)
     if doubt := first.calibration.seems_of_another_size(width, height):
         _tell([doubt], options)
-    matched = matched_shape(shape, options.stereo.downscale if first.right_file else 1.0)
     return fitting.for_size(*reversed(matched))
 
 

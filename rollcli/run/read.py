@@ -22,7 +22,7 @@ from rollcli.files.formats import Stored, decode_mask, read_image, read_stored
 from rollcli.files.results import ALIGNMENT_COLUMNS, Row
 from rollcli.files.storage import noting, read_bytes, state_of
 from rollcli.messages import one_line, printable
-from rollcli.rig.calibration import Calibration
+from rollcli.rig.calibration import Calibration, one_factor
 from rollcli.run.diagnosis import require_positive, too_large
 from rollcli.run.frame import Decoded, Frame, FrameResult, failed_frame
 from rollcli.run.options import FrameOptions, RegionOptions
@@ -175,10 +175,12 @@ class Source:
     def text(self) -> str:
         """What a file of the map carries, one line of ASCII (see `_carried`); empty where that is nothing."""
         doubt = "; ".join(self._doubts_of_map)
-        if not (self.slope_error or doubt or self.alignment):
+        height, width = self.disparity.shape
+        size = None if self.size == (width, height) else self.size
+        if not (self.slope_error or doubt or self.alignment or size):
             return ""
         carried = {"slope_error": self.slope_error, "doubt": doubt, "alignment": self.alignment}
-        return json.dumps({**carried, "levelled": self.levelled})
+        return json.dumps({**carried, "levelled": self.levelled, **({"size": size} if size else {})})
 
     def calibrated(self, calibration: Calibration | None) -> Calibration | None:
         """Return the calibration of the map, from that of the images in the files; none stays none.
@@ -241,7 +243,7 @@ def _read(frame: Frame, options: FrameOptions) -> Source:
     found = to_disparity(stored, **given._asdict(), calibration=frame.calibration)
     encoding = found.encoding.value
     beyond = {"beyond": too_large(found.disparity, stored, encoding)}
-    error, doubt, alignment, levelled = _carried(stored.text)
+    error, doubt, alignment, levelled, size = _carried(stored)
     # the roll is the same at any scale, pitch and height are not
     doubts = {"carried": doubt, **(beyond if frame.calibration is not None else {})}
     return Source(
@@ -253,23 +255,33 @@ def _read(frame: Frame, options: FrameOptions) -> Source:
         doubts=doubts,
         alignment=alignment,
         levelled=levelled,
+        size=size,
     )
 
 
-_Carried = tuple[float, str, Mapping[str, float], tuple[float, float]]
-_NOTHING: _Carried = 0.0, "", {}, (0.0, 0.0)
+def size_of_images(stored: Stored) -> tuple[int, int]:
+    """Return the width and height of the images that a map was matched from, as far as its file says, px."""
+    height, width = stored.values.shape
+    return _carried(stored)[4] or (width, height)
 
 
-def _carried(text: str) -> _Carried:
-    """Read from a map's file how the map was made: slope error, doubt, alignment and levelling of a `Source`.
+_Carried = tuple[float, str, Mapping[str, float], tuple[float, float], tuple[int, int] | None]
+_NOTHING: _Carried = 0.0, "", {}, (0.0, 0.0), None
 
-    Nothing is known where another program has written or changed it, or where no rig has such numbers.
+
+def _carried(stored: Stored) -> _Carried:
+    """Read how a map was made: slope error, doubt, alignment, levelling and size of its `Source`.
+
+    Nothing is known where another program has written or changed its file, or where no rig has such numbers.
     """
     try:
-        carried = json.loads(text)
+        carried = json.loads(stored.text)
         error, doubt, lay = float(carried["slope_error"]), carried["doubt"], carried["alignment"]
         alignment = {name: float(lay[name]) for name in ALIGNMENT_COLUMNS if name in lay}
         larger, clockwise = map(float, carried.get("levelled", _NOTHING[3]))  # earlier files have none
+        width, height = map(int, carried.get("size", reversed(stored.values.shape)))
+        # else the map was turned with --expand: its sides are not those of the images, but for one factor
+        same_view = min(width, height) > 0 and one_factor(stored.values.shape[::-1], (width, height))
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
         return _NOTHING
     most = dict(zip(ALIGNMENT_COLUMNS, LARGEST, strict=False))
@@ -277,7 +289,8 @@ def _carried(text: str) -> _Carried:
     fits = all(abs(value) <= most[name] for name, value in (*alignment.items(), *levelled))
     if not (0 <= error < math.inf and isinstance(doubt, str) and fits):
         return _NOTHING
-    return error, printable(one_line(doubt)), alignment, (larger, clockwise)
+    size = (width, height) if same_view else None
+    return error, printable(one_line(doubt)), alignment, (larger, clockwise), size
 
 
 def _match(frame: Frame, options: FrameOptions) -> Source:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import rollcli as package
+from rollcli.files.codecs.raw_map import Stored
 from rollcli.files.results import ALIGNMENT_COLUMNS
 from rollcli.rig.calibration import Calibration
 from rollcli.run.read import _NOTHING, Source, _carried
@@ -55,6 +56,19 @@ def test_a_pair_and_its_map_give_the_same_row(pair, form):
     assert of_map["status"] == of_pair["status"]
     for column in ("roll_deg", "roll_ci95_deg", "pitch_deg", "height_m"):
         assert float(of_map[column]) == pytest.approx(float(of_pair[column]), abs=0.01)
+
+
+@pytest.mark.parametrize(("form", "downscale"), [("png", "2"), ("tiff", "1.3")])
+def test_a_map_of_shrunk_views_has_the_pose_of_its_pair(pair, form, downscale):
+    """The calibration states no size: that of the images is in the file of the map."""
+    folder, _, _ = pair
+    views, out = (*VIEWS, "--downscale", downscale), f"shrunk-{form}"
+    of_pair = row_of(folder, *views)
+    assert rollcli("disparity", *views, "-o", out, "--save-as", form, cwd=folder).status == 0
+    of_map = row_of(folder, out)
+    assert float(of_map["height_m"]) == pytest.approx(float(of_pair["height_m"]), rel=1e-3)
+    for value, half in (("roll_deg", "roll_ci95_deg"), ("pitch_deg", "pitch_ci95_deg")):
+        assert abs(float(of_map[value]) - float(of_pair[value])) < float(of_pair[half]) / 2
 
 
 def test_a_map_that_is_turned_upright_keeps_what_levelling_left_open(pair):
@@ -152,23 +166,37 @@ def test_an_estimate_that_fails_says_why_the_map_may_be_wrong(tmp_path):
     assert str(raised.value) == row["message"]
 
 
+def carried(text, shape=(30, 40)):
+    return _carried(Stored(np.zeros(shape), "png", text=text))
+
+
 def test_what_a_file_carries_is_read_back_and_what_others_wrote_is_not():
     known = {"slope_error": 0.00125, "doubts": {"match": 'a "doubt"'}, "alignment": {"right_lower_px": 1.25}}
-    text = Source(np.zeros((1, 1)), **known, levelled=(1e-3, -2e-3)).text
-    assert _carried(text) == (0.00125, 'a "doubt"', {"right_lower_px": 1.25}, (1e-3, -2e-3))
-    of_before = text.replace(', "levelled": [0.001, -0.002]', "")
-    assert _carried(of_before) == (0.00125, 'a "doubt"', {"right_lower_px": 1.25}, (0.0, 0.0))
-    assert Source(np.zeros((1, 1))).text == ""
+    text = Source(np.zeros((30, 40)), **known, levelled=(1e-3, -2e-3), size=(80, 61)).text
+    said = 0.00125, 'a "doubt"', {"right_lower_px": 1.25}
+    assert carried(text) == (*said, (1e-3, -2e-3), (80, 61))
+    assert carried(text, (36, 48))[4] == (80, 61)
+    assert carried(text, (30, 48))[4] is None  # turned with room for its corners
+    of_before = text.replace(', "levelled": [0.001, -0.002], "size": [80, 61]', "")
+    assert carried(of_before) == (*said, (0.0, 0.0), (40, 30))
+    assert Source(np.zeros((30, 40)), size=(40, 30)).text == ""
     assert text.isascii()
     lies = '{"slope_error": 0, "doubt": "", "alignment": {"right_lower_px": NaN, "right_twist_px": 1}}'
     for other in ("", "{}", "[1]", "null", '{"slope_error": -1, "doubt": "", "alignment": {}}', "no", lies):
-        assert _carried(other) == (0.0, "", {}, (0.0, 0.0))
+        assert carried(other) == (0.0, "", {}, (0.0, 0.0), None)
 
 
 def test_what_a_file_carries_cannot_break_a_result():
     """No rig has such numbers, and readers of rows refuse them; a text holds nothing that UTF-8 cannot."""
     whole = {"slope_error": 0.001, "doubt": "", "alignment": {"right_lower_px": 1.25}, "levelled": [0, 0]}
-    assert _carried(json.dumps(whole)) != _NOTHING
-    for damaged in ({"alignment": {"right_lower_px": 1e300}}, {"levelled": [1e30, 0]}, {"levelled": "12"}):
-        assert _carried(json.dumps(whole | damaged)) == _NOTHING
-    assert _carried(json.dumps(whole | {"doubt": "\ud800\x1b \n!"}))[1] == r"\ud800\x1b !"
+    assert carried(json.dumps(whole)) != _NOTHING
+    for damaged in (
+        {"alignment": {"right_lower_px": 1e300}},
+        {"levelled": [1e30, 0]},
+        {"levelled": "12"},
+        {"size": 2},
+        {"size": [10**400, 1]},
+    ):
+        assert carried(json.dumps(whole | damaged)) == _NOTHING
+    assert carried(json.dumps(whole | {"size": [-40, -30]}))[4] is None
+    assert carried(json.dumps(whole | {"doubt": "\ud800\x1b \n!"}))[1] == r"\ud800\x1b !"
