@@ -4,12 +4,11 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rollcli.estimator.doubts import doubts_of
 from rollcli.estimator.interval import Tangent, interval_of, jackknife, touch
-from rollcli.estimator.moments import CheckedMap, Grid
+from rollcli.estimator.moments import Bools, CheckedMap, Grid
 from rollcli.estimator.request import AREAS, DEFAULT_REQUEST, SOLVERS, Request
 from rollcli.estimator.road.model import Parabola
 from rollcli.estimator.road.pixels import PixelSet, select_pixels
@@ -79,7 +78,7 @@ class RollEstimate:
     pitch_ci95: float | None = None
     height_m: float | None = None
     height_ci95_m: float | None = None
-    road_mask: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
+    road_mask: Bools | None = field(default=None, repr=False, compare=False)
 
     @property
     def roll_deg(self) -> float:

@@ -15,6 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import EstimationError, UsageError
 
+Bools = NDArray[np.bool_]
+Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
+
 LARGEST = np.float32(1e15)  # beyond this it is no disparity, and single precision could not square it
 MIN_PIXELS = 100
 
@@ -36,8 +40,8 @@ class CheckedMap:
     """
 
     values: NDArray[Any]
-    usable: NDArray[np.bool_] | None
-    valid: NDArray[np.bool_]
+    usable: Bools | None
+    valid: Bools
     count: int
 
     @classmethod
@@ -69,7 +73,7 @@ class CheckedMap:
             raise UsageError(f"the mask is {here}, the map {there}: give a mask of the map's size")
         if values.dtype.itemsize > 1 and not values.max(initial=0) < LARGEST:  # or one is NaN
             values = np.where(values >= LARGEST, 0, values)
-        valid: NDArray[np.bool_] = values > 0
+        valid: Bools = values > 0
         if usable is not None:
             valid &= usable
         return cls(values, usable, valid, require_pixels(valid))
@@ -91,7 +95,7 @@ def map_of(disparity: ArrayLike | None) -> NDArray[Any]:
         raise UsageError(f"a disparity map is a 2-D array of real numbers: {error}") from error
 
 
-def usable_of(mask: ArrayLike) -> NDArray[np.bool_]:
+def usable_of(mask: ArrayLike) -> Bools:
     """Return which pixels a mask lets be used, shape (H, W): neither 0 nor NaN nor hidden.
 
     Raises
@@ -101,7 +105,7 @@ def usable_of(mask: ArrayLike) -> NDArray[np.bool_]:
     """
     try:
         values = _with_hidden_as_0(mask)
-        usable: NDArray[np.bool_] = (values > 0) | (values < 0)
+        usable: Bools = (values > 0) | (values < 0)
     except (TypeError, ValueError) as error:
         raise UsageError(f"a mask is a 2-D array of numbers: {error}") from error
     if usable.ndim != 2:
@@ -114,9 +118,9 @@ def _with_hidden_as_0(values: ArrayLike) -> NDArray[Any]:
     return np.asarray(values.filled(0) if isinstance(values, np.ma.MaskedArray) else values)
 
 
-def has_disparity(values: NDArray[Any]) -> NDArray[np.bool_]:
+def has_disparity(values: NDArray[Any]) -> Bools:
     """Tell which numbers of a map are disparities: above 0, and not beyond `LARGEST`."""
-    known: NDArray[np.bool_] = (values > 0) & (values < LARGEST)
+    known: Bools = (values > 0) & (values < LARGEST)
     return known
 
 
@@ -126,13 +130,13 @@ def strips(height: int, rows: int) -> list[slice]:
     return [slice(top, min(top + rows, height)) for top in range(0, height, rows)]
 
 
-def rows_and_columns(valid: NDArray[np.bool_]) -> tuple[int, int]:
+def rows_and_columns(valid: Bools) -> tuple[int, int]:
     """Return how many rows and columns of (H, W) hold a valid pixel."""
     rows, columns = (int(np.count_nonzero(valid.any(axis=axis))) for axis in (1, 0))
     return rows, columns
 
 
-def require_pixels(valid: NDArray[np.bool_], where: str = "") -> int:
+def require_pixels(valid: Bools, where: str = "") -> int:
     """Count the valid pixels, and refuse too few of them.
 
     Parameters
@@ -163,9 +167,6 @@ def require_pixels(valid: NDArray[np.bool_], where: str = "") -> int:
             raise EstimationError(f"the valid pixels{where} fill {filled}: at least 3 of each are needed")
     return count
 
-
-Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
 
 _ROWS = 32  # of a block: its doubles stay in the cache
 _CHOOSE = np.array([[float(math.comb(j, k)) for k in range(5)] for j in range(5)])

@@ -15,7 +15,7 @@ from rollcli.estimator.energy import Energy
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.moments import CheckedMap, Floats, Grid, map_moments
 from rollcli.estimator.request import AREAS, LAMBDA0, MAX_ROLL_LIMIT_DEG, SOLVERS, Request
-from rollcli.estimator.solvers.areas import fit_plane
+from rollcli.estimator.solvers.areas import AreaMethod
 from rollcli.estimator.solvers.exact import exact, minima
 from rollcli.estimator.solvers.golden_section import golden_section, shrink_bracket
 from rollcli.estimator.solvers.gradient_descent import gradient_descent
@@ -185,8 +185,8 @@ def _methods(largest_turn: float, chosen: bool) -> dict[str, Callable[[NDArray[A
 
     def by_areas(name: str, disparity: NDArray[Any]) -> float:
         checked = CheckedMap.of(disparity, None)
-        pixels = AREAS[name].load()(checked.values, checked.valid, request, chosen)
-        return fit_plane(checked.values, pixels).solution.theta
+        choose: AreaMethod = AREAS[name].load()
+        return choose(checked.values, checked.valid, request, chosen).solution.theta
 
     return {
         "gd": lambda disparity: gradient_descent(_energy(disparity), Request(tolerance=DELTAS[-1])).theta,

@@ -9,23 +9,10 @@ import cv2
 import numpy as np
 
 from rollcli.estimator.moments import Singles
-from rollcli.stereo import row_fit
+from rollcli.stereo import row_fit, sampling
 from rollcli.stereo.misalignment import LEVEL, ColumnSupport, Misalignment
-from rollcli.stereo.views import (
-    BLOCK,
-    Map,
-    View,
-    Views,
-    block_means,
-    blocks_at,
-    grey_between,
-    resampled,
-    sampled,
-    seen_at,
-    shrink_both,
-    smoothed,
-    smoothed_between,
-)
+from rollcli.stereo.sampling import BLOCK
+from rollcli.stereo.views import Map, View, Views, resampled, shrink_both
 
 _KNOWN = 0.7  # share of a block that has to have a disparity
 _BORDER = 1.0  # px: what lies nearer to the right view's border, or beyond, is not compared
@@ -106,8 +93,8 @@ class Texture(NamedTuple):
         # no more than grey levels between pixels need: a vertical shift of real views depends on the grain
         # that it is seen in, and the match sees all of it. Smoothed twice, 41 real pairs are off by -0.013
         # degrees in place of -0.001 on average, and halved ones by -0.068 in place of -0.056
-        left = smoothed(views[0])
-        return Texture(left, smoothed_between(views[1].astype(np.float32)), *_gradients(left))
+        left = sampling.smoothed(views[0])
+        return Texture(left, sampling.smoothed_between(views[1].astype(np.float32)), *_gradients(left))
 
 
 def measure_misalignment(
@@ -163,9 +150,9 @@ def textured_share(view: View) -> float:
     """Return the share of a view's blocks that could tell a vertical disparity, were they matched."""
     if min(view.shape) < BLOCK:
         return 0.0
-    across, down = _gradients(smoothed(view))
-    along = block_means(across * across) + np.float32(_RIDGE)
-    weight = block_means(down * down) - np.square(block_means(across * down)) / along
+    across, down = _gradients(sampling.smoothed(view))
+    along = sampling.block_means(across * across) + np.float32(_RIDGE)
+    weight = sampling.block_means(down * down) - np.square(sampling.block_means(across * down)) / along
     return float(np.mean(weight > _LEAST))
 
 
@@ -216,23 +203,25 @@ class _Blocks:
         row, column = (np.arange(side // BLOCK) for side in disparity.shape)
         places = (row[:, None] + 2 * column) % every == 0
         self.count = int(np.count_nonzero(places))
-        far = blocks_at(disparity, places)
+        far = sampling.blocks_at(disparity, places)
         known = np.count_nonzero(far > 0, axis=1) > _KNOWN * BLOCK**2
         places[places] = known
-        far, down = far[known], blocks_at(texture.down, places)
+        far, down = far[known], sampling.blocks_at(texture.down, places)
         varies = np.einsum("ij,ij->i", down, down) / BLOCK**2 - np.square(down.mean(axis=1))
         # of a block's squares no more is left than all of them, over a count of `_KNOWN` of it or more
         telling = varies > np.float32(_LEAST * _KNOWN * _ROUNDING)
         places[places] = telling
         far, self._down = far[telling], down[telling]
-        self._left, self._across = blocks_at(texture.left, places), blocks_at(texture.across, places)
+        self._left, self._across = (
+            sampling.blocks_at(each, places) for each in (texture.left, texture.across)
+        )
         rows, columns = (BLOCK * place[:, None].astype(np.float32) for place in np.nonzero(places))
         within = np.arange(BLOCK, dtype=np.float32)
         self._v = rows + np.repeat(within, BLOCK)
         self._u = columns + np.tile(within, BLOCK) - far
         self._near = far.sum(axis=1) / np.maximum(np.count_nonzero(far, axis=1), 1).astype(np.float32)
         height, width = self._shape
-        u, v = seen_at(start, self._u, self._v, self._shape, self._near[:, None])
+        u, v = sampling.seen_at(start, self._u, self._v, self._shape, self._near[:, None])
         seen = (far > 0) & (u > _BORDER) & (u < width - 1 - _BORDER)
         seen &= (v > _BORDER) & (v < height - 1 - _BORDER)
         x, y = self._u - np.float32((width - 1) / 2), self._v - np.float32((height - 1) / 2)
@@ -241,10 +230,10 @@ class _Blocks:
 
     def vertical(self, at: Misalignment) -> row_fit.SeenBlocks:
         """Return the vertical disparities that are left when the right view is levelled by `at`."""
-        u, v = seen_at(at, self._u, self._v, self._shape, self._near[:, None])
+        u, v = sampling.seen_at(at, self._u, self._v, self._shape, self._near[:, None])
         if not len(u):
             return row_fit.SeenBlocks(*(self._near,) * 5)
-        read_u, read_v, grey = grey_between(self._right, u, v)
+        read_u, read_v, grey = sampling.grey_between(self._right, u, v)
         off = self._left - grey
         # else steps of less than a 64th of a pixel are none, or one, and measuring does not settle
         off -= self._across * (u - read_u) + self._down * (v - read_v)
@@ -347,8 +336,8 @@ def level(right: View, misalignment: Misalignment, near: Map | None = None) -> V
     if near is not None and misalignment.tilt:
         far = cv2.resize(near, (width, height), interpolation=cv2.INTER_LINEAR).astype(np.float32, copy=False)
         far *= np.float32(width / near.shape[1])
-    at_u, at_v = seen_at(misalignment, u, v, right.shape, far)
-    return sampled(right, at_u, at_v, cv2.INTER_CUBIC)
+    at_u, at_v = sampling.seen_at(misalignment, u, v, right.shape, far)
+    return sampling.sampled(right, at_u, at_v, cv2.INTER_CUBIC)
 
 
 def seen_from_right(disparity: Map) -> Map:

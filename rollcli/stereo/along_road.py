@@ -15,22 +15,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.estimator.moments import strips
+from rollcli.estimator.moments import Bools, strips
 from rollcli.estimator.road.find import Plane
+from rollcli.stereo import sampling
 from rollcli.stereo.alignment import level, seen_from_right
 from rollcli.stereo.misalignment import Misalignment
 from rollcli.stereo.options import StereoOptions
 from rollcli.stereo.sgbm import NARROWEST, SUBPIXELS, match_below, match_views, usable_range, without_lag
-from rollcli.stereo.views import (
-    Map,
-    Views,
-    grey_along,
-    half_the_rows,
-    resampled,
-    seen_at,
-    shrink_both,
-    smoothed_at_pixels,
-)
+from rollcli.stereo.views import Map, Views, resampled, shrink_both
 
 FindRoad = Callable[[Map, float], Plane | None]
 """Finds the road's plane in a map that is so many times smaller; None where there is none."""
@@ -92,7 +84,7 @@ class Levelled:
     count: int
     options: StereoOptions
     find_road: FindRoad | None
-    blank: NDArray[np.bool_] | None = None
+    blank: Bools | None = None
     before: "Levelled | None" = None
 
     @property
@@ -210,7 +202,7 @@ class Levelled:
         """Return some rows of both views, the right one warped so that a plane lies at a disparity `middle`.
 
         `plane` has the disparities of these rows, px. Grey levels between pixels are those of a view twice as
-        large, see `views.smoothed_between`; the left view is as smooth.
+        large, see `sampling.smoothed_between`; the left view is as smooth.
         """
         left, right = self.views
         columns = np.arange(self.shape[1], dtype=np.float32) + np.float32(middle)
@@ -218,9 +210,9 @@ class Levelled:
         warped = np.empty_like(left[rows])
         for part in strips(len(plane), _STRIP):
             near = plane[part]
-            at_u, at_v = seen_at(self.lies, columns - near, v[part], self.shape, near)
-            warped[part] = grey_along(right, at_u, np.broadcast_to(at_v, near.shape))
-        return smoothed_at_pixels(left[rows]), warped
+            at_u, at_v = sampling.seen_at(self.lies, columns - near, v[part], self.shape, near)
+            warped[part] = sampling.grey_along(right, at_u, np.broadcast_to(at_v, near.shape))
+        return sampling.smoothed_at_pixels(left[rows]), warped
 
 
 def _resized(plane: Plane, shape: tuple[int, ...], to: tuple[int, ...]) -> Plane:
@@ -245,7 +237,7 @@ class _Near(NamedTuple):
     """
 
     disparity: Map
-    told: NDArray[np.bool_]
+    told: Bools
 
 
 def _match_along(pair: Levelled, plane: Plane, coarse: Map) -> _Near | None:
@@ -292,7 +284,7 @@ def _match_blocks(views: Views, count: int) -> NDArray[np.int16]:
     matcher.setSpeckleRange(_SPECKLE[1])
     found = matcher.compute(
         *(
-            cv2.copyMakeBorder(half_the_rows(each), beside, beside, 0, 0, cv2.BORDER_REFLECT_101)
+            cv2.copyMakeBorder(sampling.half_the_rows(each), beside, beside, 0, 0, cv2.BORDER_REFLECT_101)
             for each in views
         )
     )

@@ -10,23 +10,13 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from rollcli.estimator.moments import Singles, strips
+from rollcli.estimator.moments import Bools, Singles, strips
+from rollcli.stereo import sampling
 from rollcli.stereo.misalignment import LEVEL, Misalignment
+from rollcli.stereo.sampling import BLOCK
 from rollcli.stereo.sgbm import STEEPEST
-from rollcli.stereo.views import (
-    BLOCK,
-    Views,
-    block_means,
-    blocks_at,
-    grey_between,
-    rows_around,
-    sampled,
-    seen_at,
-    smoothed,
-    smoothed_between,
-)
+from rollcli.stereo.views import Views
 
 _KNOWN = 0.7  # share of a block that has to have a disparity: else its mean is not that of its middle
 # px: how far the mean of the four blocks around may lie off; further is an edge. At half of it the noisy
@@ -98,13 +88,13 @@ class _Planes(NamedTuple):
     middle: Singles
     across: Singles
     down: Singles
-    told: NDArray[np.bool_]
+    told: Bools
 
     @staticmethod
-    def through(disparity: Singles, known: NDArray[np.bool_]) -> "_Planes":
+    def through(disparity: Singles, known: Bools) -> "_Planes":
         """Lay them through a map with these `known` pixels."""
-        share = block_means(known.astype(np.float32))
-        middle = block_means(disparity)
+        share = sampling.block_means(known.astype(np.float32))
+        middle = sampling.block_means(disparity)
         middle /= np.maximum(share, np.float32(1e-3))
         beside = np.pad(middle, 1, mode="reflect", reflect_type="odd")  # beyond, as straight on as within
         left, right, above, below = beside[1:-1, :-2], beside[1:-1, 2:], beside[:-2, 1:-1], beside[2:, 1:-1]
@@ -122,7 +112,7 @@ def _found(views: Views, planes: _Planes, rows: slice, lies: Misalignment) -> Si
     row, column = (BLOCK * place.astype(np.float32) - _OFF_MIDDLE[0] for place in np.nonzero(told))
     row += np.float32(pixels.start)
     height, width = views[0].shape
-    u, v = seen_at(lies, column - middle, row, (height, width), middle)
+    u, v = sampling.seen_at(lies, column - middle, row, (height, width), middle)
     x, y = column - middle - np.float32((width - 1) / 2), row - np.float32((height - 1) / 2)
     along, below = lies.slopes(x, y)  # within a block, what bends the rows is straight
     wider = 1 + lies.scale
@@ -134,13 +124,13 @@ def _found(views: Views, planes: _Planes, rows: slice, lies: Misalignment) -> Si
         # its rows lie between those of the left one, and smoothing sees a row beside each. OpenCV's cubic
         # turned roads by 0.026 degrees (median) where a view lies 0.05 px off, a view twice as large by 0.012
         above = max(0, pixels.start - 1)
-        left = smoothed(views[0][above : pixels.stop + 1])[pixels.start - above :]
-        near = rows_around(v, height)
-        right = smoothed_between(views[1][near].astype(np.float32))
+        left = sampling.smoothed(views[0][above : pixels.stop + 1])[pixels.start - above :]
+        near = sampling.rows_around(v, height)
+        right = sampling.smoothed_between(views[1][near].astype(np.float32))
     v -= np.float32(near.start)
     gradient = cv2.Sobel(left, cv2.CV_32F, 1, 0, ksize=1, scale=0.5).astype(np.float32, copy=False)
-    grey = blocks_at(left, told)
-    weight = blocks_at(gradient, told)
+    grey = sampling.blocks_at(left, told)
+    weight = sampling.blocks_at(gradient, told)
     weight -= weight.mean(axis=1, keepdims=True)  # one view may be brighter than the other
     power, ridge = np.einsum("ij,ij->i", weight, weight), np.float32(_RIDGE * BLOCK**2)
     # of what is left, a plain round takes the share s = power / (power + ridge), and this one s (2 - s);
@@ -148,7 +138,11 @@ def _found(views: Views, planes: _Planes, rows: slice, lies: Misalignment) -> Si
     weight *= ((1 - across) * (power + 2 * ridge) / np.square(power + ridge))[:, None]
     shift: Singles = np.zeros_like(row)
     for _ in range(_ROUNDS):
-        seen = sampled(right, u, v, cv2.INTER_LINEAR) if lies == LEVEL else grey_between(right, u, v)[2]
+        seen = (
+            sampling.sampled(right, u, v, cv2.INTER_LINEAR)
+            if lies == LEVEL
+            else sampling.grey_between(right, u, v)[2]
+        )
         off = seen - grey
         step = np.clip(np.einsum("ij,ij->i", weight, off), -_LONGEST_STEP, _LONGEST_STEP)
         u -= step[:, None]

@@ -57,7 +57,7 @@ def measure(width: int, height: int) -> dict[str, float]:
         "exact": best(lambda: exact(energy)),
         "gd": best(lambda: gradient_descent(energy)),
         "gss": best(lambda: golden_section(energy)),
-        "areas, with its pass": best(lambda: iterative(disparity, disparity > 0)),
+        "areas, with its pass": best(lambda: iterative(disparity, disparity > 0, DEFAULT_REQUEST, False)),
         "n x 3: E": best(lambda: textbook.energy(0.1)),
         "n x 3: gradient": best(lambda: textbook.gradient(0.1)),
         "n x 3: gd": best(lambda: textbook.gradient_descent(DEFAULT_REQUEST.tolerance)),

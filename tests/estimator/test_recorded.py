@@ -177,11 +177,15 @@ def _solved(name):
         "section": [golden_section(energy, each) for each in settings],
         "parabola": [energy.parabola(theta) for theta in (-1.2, 0.0, 0.3)],
         "areas": [
-            AREAS[method].load()(disparity, disparity > 0, *area)
+            _chosen(AREAS[method].load()(disparity, disparity > 0, *area))
             for method in ("plane", "areas")
-            for area in ((), (Request(max_roll=0.3), True))
+            for area in ((Request(), False), (Request(max_roll=0.3), True))
         ],
     }
+
+
+def _chosen(fit):
+    return {"used": fit.used, "iterations": fit.solution.iterations, "status": fit.solution.status}
 
 
 ASKED = (

@@ -5,17 +5,16 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from rollcli.stereo.sampling import sampled, smoothed_at_pixels
 from rollcli.stereo.views import (
     as_bright,
     as_clear,
     as_sharp,
     matched_shape,
     prepare_views,
-    sampled,
     shows_nothing,
     shrink,
     shrink_both,
-    smoothed_at_pixels,
 )
 
 

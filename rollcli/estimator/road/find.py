@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.moments import Floats, Singles, solve_normal
+from rollcli.estimator.moments import Bools, Floats, Singles, solve_normal
 from rollcli.estimator.request import DEFAULT_REQUEST, Request
 from rollcli.estimator.road.model import RoadModel
 from rollcli.estimator.road.sample import Sample, every, quantile, take_sample, values_at
@@ -243,7 +243,7 @@ def _rolls(planes: Singles) -> Singles:
 def road_plane(
     disparity: NDArray[Any],
     smaller: float = 1.0,
-    usable: NDArray[np.bool_] | None = None,
+    usable: Bools | None = None,
     request: Request = DEFAULT_REQUEST,
 ) -> Plane | None:
     """Return the plane of the road in a small map, nearly; None where no road is found.

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.moments import CheckedMap, map_moments, point_moments
+from rollcli.estimator.moments import Bools, CheckedMap, map_moments, point_moments
 from rollcli.estimator.request import AREAS, Request
 from rollcli.estimator.road.find import Road, find_road
 from rollcli.estimator.road.sample import take_sample
 from rollcli.estimator.road.surface import Surface, fit_surface, whole_surface
-from rollcli.estimator.solvers.areas import AreaMethod, fit_plane
+from rollcli.estimator.solvers.areas import AreaMethod
 from rollcli.estimator.solvers.solution import Solution
 from rollcli.estimator.tuning import SampleTuning, Tuning
 
@@ -42,10 +42,10 @@ class PixelSet:
     surface: Surface | None
     road: Road | None
     share: float
-    area: NDArray[np.bool_] | None = None
+    area: Bools | None = None
     solution: Solution | None = None
 
-    def mask(self, checked: CheckedMap, tuning: Tuning) -> NDArray[np.bool_]:
+    def mask(self, checked: CheckedMap, tuning: Tuning) -> Bools:
         """Return these pixels of the map that they were selected from, (H, W) of bool."""
         if self.area is not None:
             return self.area
@@ -89,15 +89,13 @@ def _area_pixels(
     values = checked.values
     candidates = checked.valid if surface is None else checked.valid & surface.covers(values, request.tuning)
     choose: AreaMethod = AREAS[request.method].load()
-    pixels = choose(values, candidates, request, checked.usable is not None)
-    energy, solution = fit_plane(values, pixels)
-    sampled = _sampled_surface(values, pixels.used, energy, request.tuning.sample)
-    share = np.count_nonzero(pixels.used) / checked.count
-    return PixelSet(energy, sampled, road, share, pixels.used, solution)
+    used, energy, solution = choose(values, candidates, request, checked.usable is not None)
+    sampled = _sampled_surface(values, used, energy, request.tuning.sample)
+    return PixelSet(energy, sampled, road, np.count_nonzero(used) / checked.count, used, solution)
 
 
 def _sampled_surface(
-    values: NDArray[Any], used: NDArray[np.bool_] | None, energy: Energy, tuning: SampleTuning
+    values: NDArray[Any], used: Bools | None, energy: Energy, tuning: SampleTuning
 ) -> Surface | None:
     try:
         return whole_surface(take_sample(values, used, tuning), energy)

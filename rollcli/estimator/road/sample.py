@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
-from rollcli.estimator.moments import Grid, Singles, rows_and_columns
+from rollcli.estimator.moments import Bools, Grid, Singles, rows_and_columns
 from rollcli.estimator.tuning import SampleTuning
 
 NO_STEP = np.float32(np.inf)  # to a neighbour without data: it agrees with no road
@@ -97,12 +97,12 @@ class Sample:
     places: NDArray[np.intp]
     few: slice
     column: NDArray[np.uint16]
-    coherent: NDArray[np.bool_]
+    coherent: Bools
     slopes: Singles
     noise: float
     quantum: float
     disparity: NDArray[Any]
-    usable: NDArray[np.bool_] | None
+    usable: Bools | None
     reach: int
     spacing: Spacing
     lowest: float
@@ -110,7 +110,7 @@ class Sample:
 
 def take_sample(
     disparity: NDArray[Any],
-    usable: NDArray[np.bool_] | None,
+    usable: Bools | None,
     tuning: SampleTuning,
     middle: float | None = None,
 ) -> Sample:
@@ -184,7 +184,7 @@ def take_sample(
 
 
 def _chosen(
-    disparity: NDArray[Any], usable: NDArray[np.bool_] | None, reach: int, tuning: SampleTuning
+    disparity: NDArray[Any], usable: Bools | None, reach: int, tuning: SampleTuning
 ) -> tuple[Spacing, NDArray[np.intp]]:
     """Return a spacing, and which of the pixels so far apart are valid, counted row by row."""
     spacing = Spacing.of(disparity.size / tuning.pixels)
@@ -220,7 +220,7 @@ def every(count: int, pixels: int) -> slice:
     return slice(None, None, max(1, round(count / pixels)))
 
 
-def count(agreeing: NDArray[np.bool_]) -> NDArray[np.uint8]:
+def count(agreeing: Bools) -> NDArray[np.uint8]:
     """Return how many of a pixel's neighbours agree, (neighbours, N), ten times as fast as a sum of bool."""
     counts: NDArray[np.uint8] = agreeing.view(np.uint8).sum(0, dtype=np.uint8)
     return counts

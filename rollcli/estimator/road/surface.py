@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.energy import Energy
-from rollcli.estimator.moments import Floats, Grid, Singles, powers, solve_normal, strips
+from rollcli.estimator.moments import Bools, Floats, Grid, Singles, powers, solve_normal, strips
 from rollcli.estimator.request import Request
 from rollcli.estimator.road.find import HARDLY_A_PIXEL, Road, agreement
 from rollcli.estimator.road.model import Reals, RoadModel
@@ -95,7 +95,7 @@ class Surface:
     limit: float = math.inf
     lowest: float = 0.0
 
-    def covers(self, disparity: NDArray[Any], tuning: Tuning) -> NDArray[np.bool_]:
+    def covers(self, disparity: NDArray[Any], tuning: Tuning) -> Bools:
         """Return which pixels of a map (H, W) lie on the surface and rise as it does."""
         height, width = disparity.shape
         reach = min(reach_of(height, width, tuning.sample), height - 1)
@@ -106,13 +106,13 @@ class Surface:
             covered[rows] = some[rows.start - first : rows.stop - first]
         return covered
 
-    def _covers(self, disparity: NDArray[Any], first: int, reach: int, tuning: Tuning) -> NDArray[np.bool_]:
+    def _covers(self, disparity: NDArray[Any], first: int, reach: int, tuning: Tuning) -> Bools:
         """Return the same of some rows, from `first` on: they are compared with those `reach` away."""
         rows, columns = (np.arange(side, dtype=np.float64) for side in disparity.shape)
         x, y = self.grid.normalised(columns, rows[:, None] + first)
         road = self.model.disparity(x, y)
         tolerance = tolerance_of(disparity, self.noise, tuning.sample)
-        on_it: NDArray[np.bool_] = np.abs(road - disparity) < self.limit * tolerance
+        on_it: Bools = np.abs(road - disparity) < self.limit * tolerance
         if self.level is not None:
             side = self.model.side(self.model.across(x, y), road)
             on_it &= _level_at(self.level, side, tuning.fit) > _LEAST_LEVEL

@@ -17,7 +17,6 @@ chosen area may hold an obstacle; among many, the road's are those whose planes 
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,68 +24,58 @@ from numpy.typing import NDArray
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.energy import SAME_EVERYWHERE, Energy
-from rollcli.estimator.moments import Floats, Grid, map_moments, require_pixels, solve_normal
-from rollcli.estimator.request import DEFAULT_REQUEST, Request
+from rollcli.estimator.moments import Bools, Floats, Grid, map_moments, require_pixels, solve_normal
+from rollcli.estimator.request import Request
 from rollcli.estimator.solvers.exact import exact
 from rollcli.estimator.solvers.solution import Solution, SolverStatus
 
 
-@dataclass(frozen=True)
-class AreaPixels:
-    """The pixels that a method chose.
+class AreaFit(NamedTuple):
+    """The plane of the pixels that a method chose.
 
     Attributes
     ----------
     used : ndarray of bool, shape (H, W)
-        All of them have a disparity.
-    iterations : int
-        How often the method chose anew.
-    status : SolverStatus
-        Whether its choice settled.
+        These pixels; all of them have a disparity.
+    energy : Energy
+        Of the line model over them.
+    solution : Solution
+        Its minimum; `iterations` counts how often the method chose anew, and `status` says whether its choice
+        settled.
     """
 
-    used: NDArray[np.bool_]
-    iterations: int = 0
-    status: SolverStatus = SolverStatus.CONVERGED
-
-
-# from a map (H, W), px, which of its pixels are valid and may be used, (H, W) of bool, what is asked, and
-# whether these pixels are the chosen area already
-AreaMethod = Callable[[NDArray[Any], NDArray[np.bool_], Request, bool], AreaPixels]
-_LOOKED_AT = " of road where the method looks"
-
-
-class PlaneFit(NamedTuple):
-    """The energy of the line model over some pixels, and its minimum."""
-
+    used: Bools
     energy: Energy
     solution: Solution
 
 
-def fit_plane(disparity: NDArray[Any], pixels: AreaPixels) -> PlaneFit:
-    """Fit a plane to the chosen pixels of a map (H, W) by least squares.
+# from a map (H, W), px, which of its pixels are valid and may be used, (H, W) of bool, what is asked, and
+# whether these pixels are the chosen area already
+AreaMethod = Callable[[NDArray[Any], Bools, Request, bool], AreaFit]
+_LOOKED_AT = " of road where the method looks"
+
+
+def _fitted(
+    disparity: NDArray[Any], used: Bools, rounds: int = 0, status: SolverStatus = SolverStatus.CONVERGED
+) -> AreaFit:
+    """Fit a plane to the chosen pixels of a map by least squares.
 
     Raises
     ------
     EstimationError
         When the pixels do not determine a plane.
     """
-    require_pixels(pixels.used, _LOOKED_AT)
-    peak = float(disparity.max(where=pixels.used, initial=0))
-    energy = Energy.of(map_moments(disparity, pixels.used), peak, parabolic=False)
-    return PlaneFit(energy, Solution(exact(energy).theta, pixels.iterations, pixels.status))
+    require_pixels(used, _LOOKED_AT)
+    peak = float(disparity.max(where=used, initial=0))
+    energy = Energy.of(map_moments(disparity, used), peak, parabolic=False)
+    return AreaFit(used, energy, Solution(exact(energy).theta, rounds, status))
 
 
 _ROWS = (0.6, 0.9)  # below the horizon, above a bonnet
 _COLUMNS = (0.35, 0.65)
 
 
-def lower_centre(
-    disparity: NDArray[Any],
-    usable: NDArray[np.bool_],
-    request: Request = DEFAULT_REQUEST,
-    chosen: bool = False,
-) -> AreaPixels:
+def lower_centre(disparity: NDArray[Any], usable: Bools, request: Request, chosen: bool) -> AreaFit:
     """Choose 60 to 90 % of the height and 35 to 65 % of the width, or all usable pixels.
 
     Parameters
@@ -100,28 +89,21 @@ def lower_centre(
     chosen : bool
         Whether the usable pixels are the chosen area.
 
-    Returns
-    -------
-    AreaPixels
-        With 0 iterations.
+    Raises
+    ------
+    EstimationError
+        When the pixels do not determine a plane.
     """
-    if chosen:
-        return AreaPixels(usable)
-    used = np.zeros(disparity.shape, np.bool_)
-    area = lower_centre_slices(*disparity.shape)
-    used[area] = usable[area]
-    return AreaPixels(used)
+    used = usable
+    if not chosen:
+        sides = zip((_ROWS, _COLUMNS), disparity.shape, strict=True)
+        area = tuple(slice(round(low * side), round(high * side)) for (low, high), side in sides)
+        used = np.zeros_like(usable)
+        used[area] = usable[area]
+    return _fitted(disparity, used)
 
 
-def lower_centre_slices(height: int, width: int) -> tuple[slice, slice]:
-    """Return the rows and columns of the default area."""
-    rows, columns = (
-        slice(round(low * n), round(high * n)) for (low, high), n in ((_ROWS, height), (_COLUMNS, width))
-    )
-    return rows, columns
-
-
-def tile_sums(disparity: NDArray[Any], usable: NDArray[np.bool_], side: int) -> Floats:
+def tile_sums(disparity: NDArray[Any], usable: Bools, side: int) -> Floats:
     """Sum a map tile by tile; the last row and column of tiles reach over its edge.
 
     Parameters
@@ -186,12 +168,7 @@ _ROUNDS = 20
 _LEVEL = 1e-6  # of the disparity in the middle: a plane that rises by less does so by rounding alone
 
 
-def iterative(
-    disparity: NDArray[Any],
-    usable: NDArray[np.bool_],
-    request: Request = DEFAULT_REQUEST,
-    chosen: bool = False,
-) -> AreaPixels:
+def iterative(disparity: NDArray[Any], usable: Bools, request: Request, chosen: bool) -> AreaFit:
     """Fit planes to many small areas, and choose those that agree on one.
 
     Parameters
@@ -207,13 +184,13 @@ def iterative(
 
     Returns
     -------
-    AreaPixels
+    AreaFit
         `iterations` counts the rounds of step 4.
 
     Raises
     ------
     EstimationError
-        When no area has enough valid pixels, or none looks like a road.
+        When no area has enough valid pixels, none looks like a road, or the pixels do not determine a plane.
     """
     require_pixels(usable, _LOOKED_AT)
     side = max(2, round(max(disparity.shape) / _TILES))
@@ -224,18 +201,20 @@ def iterative(
     if len(filled) == 0:
         raise EstimationError(f"no area of {extent}x{extent} pixels is at least half valid")
     grams = grams[filled]
-    planes = _fitted(grams)
+    planes = _planes(grams)
     roads = _look_like_road(planes, request.max_roll)
     if not roads.any():
         if np.ptp(disparity[usable]) == 0:
             raise EstimationError(SAME_EVERYWHERE)
         raise EstimationError("no area looks like a road: disparity grows downward in none")
     agreeing, rounds, status = _agreeing(grams, planes, roads, request.max_roll)
-    covered = _covered(filled[agreeing], across, _STEP * side, extent, disparity.shape)
-    return AreaPixels(usable & covered, rounds, status)
+    covered, step = np.zeros_like(usable), _STEP * side
+    for row, column in zip(*np.divmod(filled[agreeing], across), strict=True):
+        covered[row * step : row * step + extent, column * step : column * step + extent] = True
+    return _fitted(disparity, usable & covered, rounds, status)
 
 
-def _fitted(grams: Floats) -> Floats:
+def _planes(grams: Floats) -> Floats:
     """Return the least-squares planes (c0, c1, c2) of areas (N, 4, 4).
 
     An area is at least half valid, so that its pixels do determine a plane.
@@ -252,16 +231,16 @@ def _misfit(grams: Floats, planes: Floats) -> Floats:
     return misfit
 
 
-def _look_like_road(planes: Floats, max_roll: float) -> NDArray[np.bool_]:
+def _look_like_road(planes: Floats, max_roll: float) -> Bools:
     """Return which planes (N, 3) have a disparity that grows downward, and a roll within bounds."""
     c0, c1, c2 = planes.T
-    roads: NDArray[np.bool_] = (c2 > _LEVEL * np.abs(c0)) & (np.abs(c1) <= math.tan(max_roll) * c2)
+    roads: Bools = (c2 > _LEVEL * np.abs(c0)) & (np.abs(c1) <= math.tan(max_roll) * c2)
     return roads
 
 
 def _agreeing(
-    grams: Floats, planes: Floats, roads: NDArray[np.bool_], max_roll: float
-) -> tuple[NDArray[np.bool_], int, SolverStatus]:
+    grams: Floats, planes: Floats, roads: Bools, max_roll: float
+) -> tuple[Bools, int, SolverStatus]:
     """Return which areas (A,) share one plane, after how many rounds, and whether these settled.
 
     Parameters
@@ -283,7 +262,7 @@ def _agreeing(
     explained = misfit <= tolerance
     chosen = explained[:, int(np.argmax(grams[:, 0, 0] @ explained))]
     for rounds in range(1, _ROUNDS + 1):
-        plane = _fitted(grams[chosen].sum(axis=0, keepdims=True))
+        plane = _planes(grams[chosen].sum(axis=0, keepdims=True))
         again = _misfit(grams, plane)[:, 0] <= tolerance
         if not again.any() or not _look_like_road(plane, max_roll).all():
             return chosen, rounds, SolverStatus.DRIFTED
@@ -291,13 +270,3 @@ def _agreeing(
             return chosen, rounds, SolverStatus.CONVERGED
         chosen = again
     return chosen, _ROUNDS, SolverStatus.STEP_LIMIT
-
-
-def _covered(
-    areas: NDArray[np.intp], across: int, step: int, extent: int, shape: tuple[int, ...]
-) -> NDArray[np.bool_]:
-    """Return the pixels (H, W) of areas given by their number, `across` in a row."""
-    covered = np.zeros(shape, np.bool_)
-    for row, column in zip(*np.divmod(areas, across), strict=True):
-        covered[row * step : row * step + extent, column * step : column * step + extent] = True
-    return covered

@@ -7,8 +7,8 @@ import pytest
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.request import Request
-from rollcli.estimator.solvers.areas import fit_plane, iterative, lower_centre, lower_centre_slices
+from rollcli.estimator.request import DEFAULT_REQUEST, Request
+from rollcli.estimator.solvers.areas import iterative, lower_centre
 from rollcli.estimator.solvers.solution import SolverStatus
 from tests.estimator.synthetic_maps import bent_road, flat_road
 
@@ -17,8 +17,8 @@ SIZE = {"width": 320, "height": 240, "focal": 280.0}
 
 def areas(disparity, usable=True):
     """The solution, and the pixels it rests on."""
-    pixels = iterative(disparity, (disparity > 0) & usable)
-    return fit_plane(disparity, pixels).solution, pixels.used
+    fit = iterative(disparity, (disparity > 0) & usable, DEFAULT_REQUEST, False)
+    return fit.solution, fit.used
 
 
 def road_with_obstacles(roll_deg, seed=0):
@@ -93,8 +93,8 @@ def test_scattered_pixels_are_refused_with_the_reason():
 
 def test_areas_of_noise_whose_common_plane_is_no_road_have_not_converged():
     noise = np.random.default_rng(5).uniform(1, 9, (60, 80))
-    pixels = iterative(noise, noise > 0)
-    assert pixels.status is SolverStatus.DRIFTED
+    pixels = iterative(noise, noise > 0, DEFAULT_REQUEST, False)
+    assert pixels.solution.status is SolverStatus.DRIFTED
     v, u = np.nonzero(pixels.used)
     (_, c1, c2), *_ = np.linalg.lstsq(np.stack([np.ones(len(u)), u, v], axis=1), noise[v, u], rcond=None)
     assert c2 <= 0 or abs(c1) > math.tan(math.radians(45)) * c2
@@ -103,9 +103,9 @@ def test_areas_of_noise_whose_common_plane_is_no_road_have_not_converged():
 def test_areas_that_still_change_after_the_last_round_have_not_converged():
     v, u = np.mgrid[:60, :80] - np.array([29.5, 39.5])[:, None, None]
     curved = 80 + 0.3 * v - 0.004409 * v * v - 0.003132 * u * u - 0.00561 * u * v
-    pixels = iterative(curved, curved > 0)
-    assert pixels.status is SolverStatus.STEP_LIMIT
-    assert pixels.iterations == 20
+    found = iterative(curved, curved > 0, DEFAULT_REQUEST, False).solution
+    assert found.status is SolverStatus.STEP_LIMIT
+    assert found.iterations == 20
 
 
 def test_an_area_of_which_half_is_valid_is_enough():
@@ -118,15 +118,25 @@ def test_an_area_of_which_half_is_valid_is_enough():
         areas(half)
 
 
+def default_area(shape):
+    """The rows and columns that are documented."""
+    height, width = shape
+    rows, columns = (
+        slice(round(0.6 * height), round(0.9 * height)),
+        slice(round(0.35 * width), round(0.65 * width)),
+    )
+    return rows, columns
+
+
 def plane_of(disparity):
-    """The solution of the default area."""
-    return fit_plane(disparity, lower_centre(disparity, disparity > 0)).solution
+    """What the default area gives."""
+    return lower_centre(disparity, disparity > 0, DEFAULT_REQUEST, False)
 
 
 def test_by_default_the_area_is_the_lower_centre():
     disparity = flat_road(6)
-    rows, columns = lower_centre_slices(*disparity.shape)
-    used = lower_centre(disparity, disparity > 0).used
+    rows, columns = default_area(disparity.shape)
+    used = plane_of(disparity).used
     assert used[rows, columns].all()
     assert np.count_nonzero(used) == used[rows, columns].size
     assert rows.start / disparity.shape[0] > 0.5
@@ -135,10 +145,10 @@ def test_by_default_the_area_is_the_lower_centre():
 
 def test_what_lies_outside_the_area_has_no_say():
     clean = flat_road(6, pitch_deg=20)
-    rows, columns = lower_centre_slices(*clean.shape)
+    rows, columns = default_area(clean.shape)
     spoilt = np.random.default_rng(0).uniform(1, 90, clean.shape)
     spoilt[rows, columns] = clean[rows, columns]
-    assert plane_of(spoilt).theta == pytest.approx(plane_of(clean).theta, abs=1e-9)
+    assert plane_of(spoilt).solution.theta == pytest.approx(plane_of(clean).solution.theta, abs=1e-9)
 
 
 def test_a_mask_is_the_chosen_area():
@@ -154,9 +164,8 @@ def test_a_mask_is_the_chosen_area():
 
 def test_it_is_the_least_squares_plane_and_says_its_error():
     disparity = bent_road(4, noise=0.3, seed=5)
-    pixels = lower_centre(disparity, disparity > 0)
-    energy, found = fit_plane(disparity, pixels)
-    v, u = np.nonzero(pixels.used)
+    used, energy, found = plane_of(disparity)
+    v, u = np.nonzero(used)
     design = np.stack([np.ones(len(u)), u, v], axis=1)
     plane, squares, *_ = np.linalg.lstsq(design, disparity[v, u], rcond=None)
     assert found.theta == pytest.approx(math.atan(-plane[1] / plane[2]), abs=1e-9)
@@ -166,7 +175,7 @@ def test_it_is_the_least_squares_plane_and_says_its_error():
 
 def test_an_area_without_pixels_is_refused_with_the_reason():
     disparity = flat_road(6)
-    rows, columns = lower_centre_slices(*disparity.shape)
+    rows, columns = default_area(disparity.shape)
     disparity[rows, columns] = 0
     with pytest.raises(EstimationError, match="no valid pixel of road where the method looks"):
         plane_of(disparity)
