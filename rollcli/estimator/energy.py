@@ -77,14 +77,12 @@ class Energy:
     forms: Floats
 
     @classmethod
-    def of(cls, moments: Moments, peak: float, *, parabolic: bool = True) -> "Energy":
+    def of(cls, moments: Moments, *, parabolic: bool = True) -> "Energy":
         """Reduce the moments of a map.
 
         Parameters
         ----------
         moments : Moments
-        peak : float
-            The largest disparity among the pixels, px.
         parabolic : bool
             The road model: d = a0 + a1 y + a2 y^2, or its first two terms.
 
@@ -93,7 +91,7 @@ class Energy:
         EstimationError
             When the pixels do not determine a plane, or every angle fits them equally well.
         """
-        n = float(moments.s[0, 0])
+        n, peak = float(moments.s[0, 0]), moments.peak
         if n <= 0:
             raise EstimationError("no valid pixel: all are zero, negative, not finite or masked out")
         if not _SMALLEST < peak < _LARGEST:

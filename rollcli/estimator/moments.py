@@ -120,8 +120,7 @@ def _with_hidden_as_0(values: ArrayLike) -> NDArray[Any]:
 
 def has_disparity(values: NDArray[Any]) -> Bools:
     """Tell which numbers of a map are disparities: above 0, and not beyond `LARGEST`."""
-    known: Bools = (values > 0) & (values < LARGEST)
-    return known
+    return np.asarray((values > 0) & (values < LARGEST))
 
 
 def strips(height: int, rows: int) -> list[slice]:
@@ -215,23 +214,26 @@ class Moments:
         t[i, j] = sum w d p^i q^j for i + j <= 2, px.
     dd : float
         sum w d^2, px^2.
+    peak : float
+        The largest disparity, px.
     """
 
     grid: Grid
     s: Floats
     t: Floats
     dd: float
+    peak: float
 
 
-def map_moments(disparity: NDArray[Any], weights: NDArray[Any] | None = None) -> Moments:
-    """Sum a map.
+def map_moments(disparity: NDArray[Any], usable: Bools | None = None) -> Moments:
+    """Sum a map; each pixel weighs 1.
 
     Parameters
     ----------
     disparity : ndarray, shape (H, W)
         Real numbers, px; values <= 0, NaN and inf are no data and weigh nothing.
-    weights : ndarray, shape (H, W), optional
-        Finite and not negative (or bool); all ones by default.
+    usable : ndarray of bool, shape (H, W), optional
+        The pixels that may be used; all by default.
 
     Returns
     -------
@@ -240,25 +242,24 @@ def map_moments(disparity: NDArray[Any], weights: NDArray[Any] | None = None) ->
     height, width = disparity.shape
     grid = Grid.of_shape(height, width)
     along, down = map(powers, grid.normalised(np.arange(width), np.arange(height)))
-    s, t, dd = np.zeros((5, 5)), np.zeros((3, 3)), 0.0
+    s, t, dd, peak = np.zeros((5, 5)), np.zeros((3, 3)), 0.0, 0.0
     for rows in strips(height, _ROWS):
         block = np.fmax(disparity[rows], 0).astype(np.float64)  # fmax: NaN gives way to 0
         block[np.isinf(block)] = 0
-        w, pull = (block > 0).astype(np.float64), block
-        if weights is not None:
-            w *= weights[rows]
-            pull = w * block
-        s += along @ (down[:, rows] @ w).T
-        t += along[:3] @ (down[:3, rows] @ pull).T
-        dd += float(np.vdot(pull, block))
-    return Moments(grid, s, t, dd)
+        if usable is not None:
+            block *= usable[rows]
+        s += along @ (down[:, rows] @ (block > 0).astype(np.float64)).T
+        t += along[:3] @ (down[:3, rows] @ block).T
+        dd += float(np.vdot(block, block))
+        peak = max(peak, float(block.max()))
+    return Moments(grid, s, t, dd, peak)
 
 
 def point_moments(p: Floats, q: Floats, disparity: Floats, weights: Floats, grid: Grid) -> Moments:
     """Sum scattered pixels, given by their normalised coordinates; all arrays have shape (N,)."""
     along, down, pull = powers(p), powers(q), weights * disparity
     s, t = along @ (down * weights).T, along[:3] @ (down[:3] * pull).T
-    return Moments(grid, s, t, float(pull @ disparity))
+    return Moments(grid, s, t, float(pull @ disparity), float(disparity.max()))
 
 
 def powers(x: NDArray[np.floating[Any]], degree: int = 4) -> Floats:
@@ -271,8 +272,7 @@ def powers(x: NDArray[np.floating[Any]], degree: int = 4) -> Floats:
 
 def to_powers_of_sum(offsets: Floats) -> Floats:
     """Return the matrices from powers of x to powers of x + offset, for each offset: shape (B, 5, 5)."""
-    matrices: Floats = _CHOOSE * powers(offsets).T[:, _REST]
-    return matrices
+    return np.asarray(_CHOOSE * powers(offsets).T[:, _REST])
 
 
 _RIDGE = 1e-10  # of each diagonal element: a parameter that the pixels do not determine stays finite

@@ -7,7 +7,6 @@ Add a method that chooses pixels: an `AreaMethod` in ``solvers/areas.py``, and o
 """
 
 import math
-from collections.abc import Collection
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Literal, NamedTuple
@@ -101,9 +100,9 @@ class Request:
     tuning: Tuning = TUNING
 
     def __post_init__(self) -> None:
-        _check_name("method", self.method, METHODS)
-        _check_name("model", self.model, MODELS)
-        _check_name("road", self.road, ROADS)
+        for kind, names in (("method", METHODS), ("model", MODELS), ("road", ROADS)):
+            if getattr(self, kind) not in names:
+                raise UsageError(f"{kind} {getattr(self, kind)!r}: choose one of {', '.join(names)}")
         if self.lambda0 != "auto" and not 0 < self.lambda0 < math.inf:
             raise UsageError(f"lambda0 {self.lambda0}: give a positive number, or auto")
         if not 0 < self.tolerance < math.inf:
@@ -128,11 +127,6 @@ class Request:
     def parabolic(self) -> bool:
         """Whether the road is a parabola, not a line."""
         return self.model == "parabola"
-
-
-def _check_name(kind: str, name: str, names: Collection[str]) -> None:
-    if name not in names:
-        raise UsageError(f"{kind} {name!r}: choose one of {', '.join(names)}")
 
 
 DEFAULT_REQUEST = Request()

@@ -165,7 +165,7 @@ def examine(
 
 
 def _energy(disparity: NDArray[Any], *, parabolic: bool = True) -> Energy:
-    return Energy.of(map_moments(disparity), float(disparity.max()), parabolic=parabolic)
+    return Energy.of(map_moments(disparity), parabolic=parabolic)
 
 
 def _sweep(energy: Energy) -> tuple[tuple[int | None, ...], ...]:
@@ -294,8 +294,7 @@ class Times:
 
 def time_solvers(disparity: NDArray[Any]) -> Times:
     """Time both solvers in all three forms on one map (H, W), px, 0 is no data."""
-    peak = float(disparity.max())
-    energy, textbook = Energy.of(map_moments(disparity), peak), Textbook(disparity)
+    energy, textbook = _energy(disparity), Textbook(disparity)
 
     def timed(solve: Callable[[float], Solution], times: int) -> tuple[float, ...]:
         return tuple(_best(partial(solve, delta), times) for delta in DELTAS)
@@ -304,7 +303,7 @@ def time_solvers(disparity: NDArray[Any]) -> Times:
         return solve(energy, Request(tolerance=delta))
 
     def with_pass(solve: Solver, delta: float) -> Solution:
-        return solve(Energy.of(map_moments(disparity), peak), Request(tolerance=delta))
+        return solve(_energy(disparity), Request(tolerance=delta))
 
     seconds: dict[tuple[str, str], tuple[float, ...]] = {}
     written = {"gss": textbook.golden_section, "gd": textbook.gradient_descent}

@@ -48,7 +48,7 @@ def best(function: Callable[[], Any], seconds: float = 0.5) -> float:
 def measure(width: int, height: int) -> dict[str, float]:
     """Every figure of one size, milliseconds."""
     disparity = road(width, height)
-    energy = Energy.of(map_moments(disparity), float(disparity.max()))
+    energy = Energy.of(map_moments(disparity))
     textbook = Textbook(disparity)
     figures = {
         "np.sum of the map": best(lambda: disparity.sum()),

@@ -84,7 +84,7 @@ def random_maps(draw):
 
 def energy_of(disparity, **options):
     """The energy over all valid pixels of a map."""
-    return Energy.of(map_moments(disparity), float(np.nanmax(disparity)), **options)
+    return Energy.of(map_moments(disparity), **options)
 
 
 def degrees_apart(one, other):

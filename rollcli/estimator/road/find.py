@@ -144,8 +144,7 @@ def draw_planes(sample: Sample, request: Request) -> Singles:
     area = np.where(wide, area, 1)
     c1, c2 = (d1 * y2 - d2 * y1) / area, (x1 * d2 - x2 * d1) / area
     good = (wide & (c2 > 0) & (np.abs(c1) <= math.tan(request.max_roll) * c2)).nonzero()[0][: draws // 2]
-    planes: Singles = np.stack([d[a] - c1 * x[a] - c2 * y[a], c1, c2], 1)[good]
-    return planes
+    return np.asarray(np.stack([d[a] - c1 * x[a] - c2 * y[a], c1, c2], 1)[good])
 
 
 @lru_cache(maxsize=8)
@@ -188,8 +187,7 @@ class Judge:
         total, lost = slope.dot(near), place.dot(near)
         slope *= np.minimum(cost, 0, out=cost)
         lost += slope.dot(near)
-        scores: Singles = -lost / np.maximum(total, np.float32(1e-30))
-        return scores
+        return np.asarray(-lost / np.maximum(total, np.float32(1e-30)))
 
     def refined(self, planes: Singles) -> Singles:
         """Fit each plane (K, 3) to the pixels on it, a few times, by the places and slopes of the first."""
@@ -206,8 +204,7 @@ class Judge:
 
     def _off(self, planes: Singles, some: slice) -> Singles:
         """Return what planes are over pixels, in tolerances, (K, N)."""
-        off: Singles = np.column_stack([planes, np.full_like(planes[:, 0], -1)]).dot(self._rows[:, some])
-        return off
+        return np.asarray(np.column_stack([planes, np.full_like(planes[:, 0], -1)]).dot(self._rows[:, some]))
 
     def _weighed(self, planes: Singles, some: slice) -> tuple[Singles, Singles, Singles]:
         """Return the weights of pixels by place and by slopes, and what planes are over them, (K, N).

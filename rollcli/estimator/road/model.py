@@ -54,8 +54,7 @@ class RoadModel(NamedTuple):
     def turned(self, places: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return across and along, shape (2, N), of x and y, shape (2, N): several times faster."""
         c, s = math.cos(self.theta), math.sin(self.theta)
-        turned: NDArray[np.float32] = np.array([[c, s], [-s, c]], np.float32).dot(places)
-        return turned
+        return np.asarray(np.array([[c, s], [-s, c]], np.float32).dot(places))
 
     def disparity(self, x: Reals, y: Reals) -> Reals:
         """Return the road's disparity, px, camber included."""
@@ -120,5 +119,4 @@ class RoadModel(NamedTuple):
 
     def _positive(self, disparity: Reals) -> Reals:
         """Return disparities, px, that one can divide by."""
-        positive: Reals = np.maximum(disparity, _HARDLY * abs(self.alpha[1]) + 1e-30)
-        return positive
+        return np.asarray(np.maximum(disparity, _HARDLY * abs(self.alpha[1]) + 1e-30))

@@ -74,11 +74,9 @@ def select_pixels(checked: CheckedMap, request: Request) -> PixelSet:
         return _area_pixels(checked, road, surface, request)
     if surface is not None:
         moments = point_moments(surface.x, surface.y, surface.d, surface.weights, surface.grid)
-        energy = Energy.of(moments, float(surface.d.max()), parabolic=surface.parabolic)
+        energy = Energy.of(moments, parabolic=surface.parabolic)
         return PixelSet(energy, surface, road, surface.share)
-    used = values if usable is None else np.where(usable, values, 0)
-    peak = float(np.fmax.reduce(used, axis=None))  # where one is NaN the other is taken
-    energy = Energy.of(map_moments(used), peak, parabolic=request.parabolic)
+    energy = Energy.of(map_moments(values, usable), parabolic=request.parabolic)
     return PixelSet(energy, _sampled_surface(values, usable, energy, tuning.sample), None, 1.0)
 
 

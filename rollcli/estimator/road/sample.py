@@ -222,8 +222,7 @@ def every(count: int, pixels: int) -> slice:
 
 def count(agreeing: Bools) -> NDArray[np.uint8]:
     """Return how many of a pixel's neighbours agree, (neighbours, N), ten times as fast as a sum of bool."""
-    counts: NDArray[np.uint8] = agreeing.view(np.uint8).sum(0, dtype=np.uint8)
-    return counts
+    return np.asarray(agreeing.view(np.uint8).sum(0, dtype=np.uint8))
 
 
 def quantile(values: NDArray[np.floating[Any]], part: float) -> float:
@@ -249,8 +248,7 @@ def reach_of(height: int, width: int, tuning: SampleTuning) -> int:
 
 def tolerance_of(d: NDArray[Any], noise: float, tuning: SampleTuning) -> Singles:
     """Return how far each pixel of a road may be off, px."""
-    tolerance: Singles = np.sqrt(np.float32(noise) ** 2 + np.square(np.float32(tuning.uneven_share) * d))
-    return tolerance
+    return np.asarray(np.sqrt(np.float32(noise) ** 2 + np.square(np.float32(tuning.uneven_share) * d)))
 
 
 def values_at(places: NDArray[np.intp], disparity: NDArray[Any]) -> Singles:

@@ -314,13 +314,11 @@ class NearPixels:
         np.square(along, out=design[2])
         model.turning(across, along, out=design[4])
         np.subtract(self.d, np.array([*model.alpha, model.camber], np.float32).dot(design[:4]), out=design[5])
-        squares: Singles = np.square(design[5] / self.tolerance)
-        return squares
+        return np.asarray(np.square(design[5] / self.tolerance))
 
     def _weights(self, squares: Singles, limit: float) -> Singles:
         """Return Tukey's weights, times those by place."""
-        weights: Singles = np.square(np.maximum(1 - squares / np.float32(limit**2), 0)) * self.place
-        return weights
+        return np.asarray(np.square(np.maximum(1 - squares / np.float32(limit**2), 0)) * self.place)
 
     def _products(self, design: Singles, weights: Singles) -> Floats:
         """Return the normal equations of a design (6, N), right-hand side included: shape (6, 6)."""

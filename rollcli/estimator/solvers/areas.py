@@ -66,8 +66,7 @@ def _fitted(
         When the pixels do not determine a plane.
     """
     require_pixels(used, _LOOKED_AT)
-    peak = float(disparity.max(where=used, initial=0))
-    energy = Energy.of(map_moments(disparity, used), peak, parabolic=False)
+    energy = Energy.of(map_moments(disparity, used), parabolic=False)
     return AreaFit(used, energy, Solution(exact(energy).theta, rounds, status))
 
 
@@ -227,15 +226,13 @@ def _misfit(grams: Floats, planes: Floats) -> Floats:
     x = np.concatenate([-planes, np.ones((len(planes), 1))], axis=1)
     forms = (x[:, :, None] * x[:, None, :]).reshape(-1, 16)
     squares = grams.reshape(-1, 16) @ forms.T / grams[:, :1, 0]
-    misfit: Floats = np.sqrt(np.maximum(squares, 0))
-    return misfit
+    return np.asarray(np.sqrt(np.maximum(squares, 0)))
 
 
 def _look_like_road(planes: Floats, max_roll: float) -> Bools:
     """Return which planes (N, 3) have a disparity that grows downward, and a roll within bounds."""
     c0, c1, c2 = planes.T
-    roads: Bools = (c2 > _LEVEL * np.abs(c0)) & (np.abs(c1) <= math.tan(max_roll) * c2)
-    return roads
+    return np.asarray((c2 > _LEVEL * np.abs(c0)) & (np.abs(c1) <= math.tan(max_roll) * c2))
 
 
 def _agreeing(
