@@ -60,14 +60,19 @@ class Jackknife:
     bend: float
     camber: float | None
 
-    def spreads(self) -> tuple[float, float, float]:
-        """Return the half-widths of theta's interval, radians: by bands, by columns, and the textbook's."""
+    def noise(self, theta: float, tuning: IntervalTuning) -> float:
+        """Return the half-width that noise and misfit make at a roll, radians, before `tuning.factor`.
+
+        A matcher takes the disparity for constant within its block. The more a rolled road's disparity
+        changes along the rows, the more that errs; these errors are smooth and do not show in the residuals.
+        """
         turned = (self.bands[:, _THETA], self.columns[:, _THETA])
-        bands, columns = (
+        by_groups = [
             float(np.interp(freedom, range(1, len(_T975) + 1), _T975)) * math.sqrt(float(thetas.dot(thetas)))
             for thetas, freedom in zip(turned, self.freedom, strict=True)
-        )
-        return bands, columns, _NORMAL * math.sqrt(max(0.0, self.white[_THETA, _THETA]))
+        ]
+        white = _NORMAL * math.sqrt(max(0.0, self.white[_THETA, _THETA]))
+        return (1 + tuning.slant * abs(math.sin(theta))) * math.hypot(*by_groups, tuning.white * white)
 
 
 @dataclass(frozen=True)
@@ -98,21 +103,11 @@ def interval_of(jackknife: Jackknife, theta: float, turned: float, tuning: Inter
         Standard deviation of an error that all pixels share, by which the map itself is turned, radians.
     tuning : IntervalTuning
     """
-    noise = tuning.factor * noise_of(jackknife, theta, tuning)
+    noise = tuning.factor * jackknife.noise(theta, tuning)
     uneven, bend = tuning.uneven * jackknife.uneven, tuning.bend * jackknife.bend
     hidden = tuning.twist * jackknife.hidden
     half_width = math.hypot(noise, uneven, bend, hidden, _NORMAL * turned)
     return Interval(min(noise, math.pi / 2), min(half_width, math.pi / 2))
-
-
-def noise_of(jackknife: Jackknife, theta: float, tuning: IntervalTuning) -> float:
-    """Return the half-width that noise and misfit make at a roll, radians, before `tuning.factor`.
-
-    A matcher takes the disparity for constant within its block. The more a rolled road's disparity changes
-    along the rows, the more that errs; these errors are smooth and do not show in the residuals.
-    """
-    bands, columns, white = jackknife.spreads()
-    return (1 + tuning.slant * abs(math.sin(theta))) * math.hypot(bands, columns, tuning.white * white)
 
 
 def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackknife:

@@ -93,9 +93,7 @@ class Comparison:
     heights: Mapping[int, Accuracy] = field(default_factory=dict)
 
 
-def assess(
-    rows: Sequence[Row], truth: Mapping[str, KnownPose], result_name: str = "the result"
-) -> Comparison:
+def assess(rows: Sequence[Row], truth: Mapping[str, KnownPose], result_name: str) -> Comparison:
     """Compare a result with known angles, pitches and heights, matched by stem.
 
     Parameters
@@ -355,9 +353,7 @@ def run_accuracy(options: AccuracyOptions) -> ExitStatus:
     return ExitStatus.FRAMES_FAILED if found.no_angle else ExitStatus.DONE
 
 
-def _heights(
-    read: Result, known: Mapping[str, KnownPose], options: AccuracyOptions
-) -> Mapping[int, Accuracy]:
+def _heights(read: Result, known: Mapping[str, KnownPose], options: AccuracyOptions) -> dict[int, Accuracy]:
     """Compare the heights over the road of a folder that was named, or of that of the run."""
     heights, beside = options.heights, options.truth.rpartition("/")[0] or "."
     if heights is None:

@@ -97,12 +97,7 @@ class Findings:
 
 
 def examine(
-    file: str,
-    disparity: NDArray[Any],
-    turns: Sequence[float],
-    truth: float | None = None,
-    *,
-    chosen: bool = False,
+    file: str, disparity: NDArray[Any], turns: Sequence[float], truth: float | None, *, chosen: bool
 ) -> Findings:
     """Run every experiment but the run times on one map.
 
@@ -114,7 +109,7 @@ def examine(
         Pixels; 0 is no data.
     turns : sequence of float
         The angles that the map is rotated by, radians.
-    truth : float, optional
+    truth : float or None
         The map's known roll, radians. Without it, an estimate is held against the exact minimum of the map
         before it was rotated, and that of a method which does not solve this energy against its own.
     chosen : bool

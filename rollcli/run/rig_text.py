@@ -267,13 +267,14 @@ def correction_text(health: Health | None, rows: DriveRows | None, results: Sequ
     axis, about = (0.0, 0.0), _MIDDLE
     if health.calibration is not None:
         axis, about = health.calibration.right_axis(width, height), "the principal point"
-    larger = None if rows is None else rows.columns.scale
+    lies = health.misalignment
+    larger = lies.scale if rows is None else rows.columns.scale
     values = {
         **alignment_values(health),
         "width": width,
         "height": height,
         **({} if rows is None else rows.as_text(height, width)),
-        "matrix": health.misalignment.matrix(height, width, larger, axis),
+        "matrix": lies.matrix(height, width, larger, axis),
         "opencv": _CALL,
         "note": "matrix: from a pixel of the corrected right view to the given one, without twist and bend, "
         f"which no matrix holds, about {about}; {NOT_SEEN}",

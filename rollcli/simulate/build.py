@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rollcli.simulate.materials import Values
 from rollcli.simulate.relief import LEVEL, Dip
 from rollcli.simulate.road import Carriageway, Piece, Site, cross_section, draw_asphalt, draw_carriageway
-from rollcli.simulate.scene import FAR, Light, Scene, draw, draw_light
+from rollcli.simulate.scene import FAR, Light, Scene, draw_light
 from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Ground, Surface
 from rollcli.simulate.views import Camera, View, expose, render_view
@@ -122,10 +122,10 @@ def draw_dips(spec: FrameSpec, carriageway: Carriageway) -> tuple[Dip, ...]:
     found: list[Dip] = []
     for _ in range(spec.dips or 0):
         for _ in range(_TRIES):
-            across, along = draw(rng, *_RADIUS), draw(rng, *_RADIUS)
-            height = draw(rng, *_DEPTH) * float(rng.choice([-1.0, 1.0]))
-            middle = carriageway.shift + carriageway.lane * draw(rng, -0.5, 0.5)
-            dip = Dip(middle, draw(rng, *_AHEAD), across, along, height)
+            across, along = rng.uniform(*_RADIUS), rng.uniform(*_RADIUS)
+            height = rng.uniform(*_DEPTH) * float(rng.choice([-1.0, 1.0]))
+            middle = carriageway.shift + carriageway.lane * rng.uniform(-0.5, 0.5)
+            dip = Dip(middle, rng.uniform(*_AHEAD), across, along, height)
             if _fits(dip, found, carriageway):
                 found.append(dip)
                 break
@@ -186,8 +186,6 @@ class RenderedFrame:
         float32 (H, W), pixels, of the left view; 0 where there is only sky.
     road : numpy.ndarray
         bool (H, W): True where the left view shows the carriageway.
-    spec : FrameSpec
-        What was rendered.
     heights : numpy.ndarray or None
         float32 (H, W), metres: how high the ground in the left view lies over the road without dips and
         bumps; NaN where it shows no ground. None unless the spec has a number of dips.
@@ -197,7 +195,6 @@ class RenderedFrame:
     right: NDArray[np.uint8]
     disparity: Values
     road: NDArray[np.bool_]
-    spec: FrameSpec
     heights: Values | None = None
 
 
@@ -212,4 +209,4 @@ def render_frame(spec: FrameSpec) -> RenderedFrame:
     )
     disparity = (spec.focal * spec.baseline / views[0].depth).astype(np.float32)
     heights = None if spec.dips is None else true_heights(scene, spec, cameras[0], views[0])
-    return RenderedFrame(left, right, disparity, views[0].material == scene.road, spec, heights)
+    return RenderedFrame(left, right, disparity, views[0].material == scene.road, heights)

@@ -8,7 +8,7 @@ import numpy as np
 from rollcli.simulate.materials import WARM, Asphalt, Facade, Leaves, Mark, Patch, Paving, Plain, Tint
 from rollcli.simulate.options import GUTTER_WIDTH
 from rollcli.simulate.relief import Array, Relief, draw_relief, lane_plane
-from rollcli.simulate.scene import FAR, Post, Scene, Solid, TreeCrown, draw, draw_offset
+from rollcli.simulate.scene import FAR, Post, Scene, Solid, TreeCrown, draw_offset
 from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Backdrop, Course, Ground, Wall
 from rollcli.simulate.vehicles import Shape, car_materials, extruded, rectangle, vehicle
@@ -128,19 +128,19 @@ class Carriageway:
 
 def draw_carriageway(rng: np.random.Generator, spec: FrameSpec) -> Carriageway:
     """Draw a carriageway: half of them bend; country roads can have a single lane, others room to park."""
-    bend = float(rng.choice([0.0, 1.0])) * draw(rng, -1 / 250, 1 / 250)
+    bend = float(rng.choice([0.0, 1.0])) * rng.uniform(-1 / 250, 1 / 250)
     heading = float(rng.normal(0, 0.015))
     if spec.bend is not None:
         bend = spec.bend
     elif spec.scene == "bare":
         bend = 0.0
     course = Course(heading, bend, spec.curvature)
-    lane, shift = draw(rng, 2.8, 3.7), float(rng.normal(0, 0.25))
+    lane, shift = rng.uniform(2.8, 3.7), float(rng.normal(0, 0.25))
     country = spec.scene in ("bare", "verge")
     # the ridge of a roof runs between two lanes
     single = bool(rng.random() < 0.3) and country and spec.cross_section != "roof"
     parking = bool(rng.random() < 0.4) and not country
-    shoulder = 2.2 if parking else draw(rng, 0.1, 0.6)
+    shoulder = 2.2 if parking else rng.uniform(0.1, 0.6)
     left = shift - (0.5 if single else 1.5) * lane - shoulder
     right = shift + 0.5 * lane + shoulder
     section = cross_section(spec, left, right, course.bend)
@@ -162,11 +162,11 @@ def draw_asphalt(rng: np.random.Generator, carriageway: Carriageway) -> Asphalt:
     gutters = carriageway.left, carriageway.right - GUTTER_WIDTH
     patches = [Patch(start, start + GUTTER_WIDTH, -50, FAR, -0.2) for start in gutters]
     for _ in range(rng.integers(1, 6)):
-        x, z = draw(rng, carriageway.left, carriageway.right), draw(rng, 3, 40)
-        wide, long = draw(rng, 0.5, 2.0), draw(rng, 0.8, 6.0)
-        patches.append(Patch(x, x + wide, z, z + long, draw(rng, -0.35, 0.2)))
-    level, grain = draw(rng, 0.16, 0.30), draw(rng, 0.04, 0.2)
-    seams = [draw(rng, carriageway.left, carriageway.right) for _ in range(rng.integers(1, 4))]
+        x, z = rng.uniform(carriageway.left, carriageway.right), rng.uniform(3, 40)
+        wide, long = rng.uniform(0.5, 2.0), rng.uniform(0.8, 6.0)
+        patches.append(Patch(x, x + wide, z, z + long, rng.uniform(-0.35, 0.2)))
+    level, grain = rng.uniform(0.16, 0.30), rng.uniform(0.04, 0.2)
+    seams = [rng.uniform(carriageway.left, carriageway.right) for _ in range(rng.integers(1, 4))]
     wheels = carriageway.shift + 0.25 * carriageway.lane, carriageway.lane / 2
     return Asphalt(level, grain, wheels, marks, patches, seams, offset=draw_offset(rng))
 
@@ -185,7 +185,7 @@ class Site:
 
     def draw(self, low: float, high: float) -> float:
         """Draw a number evenly from `low` to `high`."""
-        return draw(self.rng, low, high)
+        return self.rng.uniform(low, high)
 
     def add_grass(self) -> int:
         """Add the material of lawns and verges; return its index."""

@@ -174,7 +174,7 @@ def draw_light(rng: np.random.Generator) -> Light:
     height, azimuth = rng.uniform(0.45, 1.2), rng.uniform(-np.pi, np.pi)
     sun = np.array([np.cos(height) * np.sin(azimuth), np.sin(height), np.cos(height) * np.cos(azimuth)])
     ambient = rng.uniform(0.28, 0.45) if rng.random() < 0.5 else rng.uniform(0.7, 0.9)
-    return Light(sun, float(ambient), float(rng.uniform(1.2, 1.6)), float(rng.uniform(0, 1000)))
+    return Light(sun, ambient, rng.uniform(1.2, 1.6), draw_offset(rng))
 
 
 def in_shadow(points: Array, sun: Array, casters: Sequence[Surface]) -> NDArray[np.bool_]:
@@ -243,11 +243,6 @@ class Scene:
         return len(self.materials) - 1
 
 
-def draw(rng: np.random.Generator, low: float, high: float) -> float:
-    """Draw a number evenly from `low` to `high`."""
-    return float(rng.uniform(low, high))
-
-
 def draw_offset(rng: np.random.Generator) -> float:
     """Draw the offset at which a material reads its noise, metres, so that no two materials look alike."""
-    return draw(rng, 0, 1000)
+    return rng.uniform(0, 1000)

@@ -306,12 +306,8 @@ def _render_band(scene: Scene, camera: Camera, rows: slice) -> View:
     light = shade(scene, rays, hits)
     light[edge] = shade(scene, between, finer).reshape(4, -1, 3).mean(axis=0)
     shape, inner = (len(around), camera.width), slice(rows.start - around.start, rows.stop - around.start)
-    return View(
-        hits.depth.reshape(shape)[inner],
-        hits.surface.reshape(shape)[inner],
-        hits.material.reshape(shape)[inner],
-        light.reshape(*shape, 3)[inner],
-    )
+    found: tuple[NDArray[Any], ...] = (hits.depth, hits.surface, hits.material, light)
+    return View(*(each.reshape(*shape, *each.shape[1:])[inner] for each in found))
 
 
 def _edges(hits: Hits, width: int) -> NDArray[np.bool_]:

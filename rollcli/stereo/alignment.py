@@ -156,47 +156,13 @@ def textured_share(view: View) -> float:
     return float(np.mean(weight > _LEAST))
 
 
-class _Shares(NamedTuple):
-    """What each pixel says of its block's shift down the rows and along them, and where the blocks lie.
-
-    The least-squares shift is the sum of the grey differences, each times a share that the gradients decide.
-    `share` is for the shift down the rows, `along` for that along them, less `mixed` times the one down the
-    rows. Arrays of pixels have shape (blocks, pixels of a block).
-    """
-
-    share: Singles
-    along: Singles
-    mixed: Singles
-    weight: Singles
-    x: Singles
-    y: Singles
-
-    @staticmethod
-    def of(across: Singles, down: Singles, seen: Singles, x: Singles, y: Singles) -> "_Shares":
-        """Work them out from the gradients and places of the pixels that are `seen` (1; others 0)."""
-        count = np.maximum(seen.sum(axis=1), np.float32(1))
-        across, down = across * seen, down * seen
-
-        def mean(one: Singles, other: Singles) -> Singles:
-            found: Singles = np.einsum("ij,ij->i", one, other) / count
-            return found
-
-        # covariances within a block: the views' brightness may differ from place to place
-        mean_across, mean_down = mean(across, seen), mean(down, seen)
-        varies = mean(across, across) - np.square(mean_across) + np.float32(_RIDGE)
-        mixed = (mean(across, down) - mean_across * mean_down) / varies
-        weight = mean(down, down) - np.square(mean_down) - np.square(mixed) * varies
-        weight[(weight <= _LEAST) | (count <= _KNOWN * BLOCK**2)] = 0
-        along = across - mean_across[:, None] * seen
-        share = down - mean_down[:, None] * seen - mixed[:, None] * along
-        share /= (np.maximum(weight, np.float32(_LEAST)) * count)[:, None]
-        along /= (varies * count)[:, None]
-        most = np.float32(_MOST)
-        return _Shares(share, along, mixed, np.minimum(weight, most), mean(x, seen), mean(y, seen))
-
-
 class _Blocks:
-    """The blocks of a pair; what does not change from round to round is computed once."""
+    """The blocks of a pair; what does not change from round to round is computed once.
+
+    A block's least-squares shift is the sum of its grey differences, each times a share that the gradients
+    decide: `_share` for the shift down the rows, and `_shift_along` for that along them, less `_mixed` times
+    the one down the rows. Arrays of pixels have shape (blocks, pixels of a block).
+    """
 
     def __init__(self, texture: Texture, disparity: Singles, start: Misalignment, every: int) -> None:
         self._right, self._shape = texture.right, texture.left.shape
@@ -225,8 +191,29 @@ class _Blocks:
         seen = (far > 0) & (u > _BORDER) & (u < width - 1 - _BORDER)
         seen &= (v > _BORDER) & (v < height - 1 - _BORDER)
         x, y = self._u - np.float32((width - 1) / 2), self._v - np.float32((height - 1) / 2)
-        self._shares = _Shares.of(self._across, self._down, seen.astype(np.float32), x, y)
+        self._weigh(seen.astype(np.float32), x, y)
         self._along = np.zeros(len(self._u), np.float32)
+
+    def _weigh(self, seen: Singles, x: Singles, y: Singles) -> None:
+        """Work the shares out from the gradients and places of the pixels that are `seen` (1; others 0)."""
+        count = np.maximum(seen.sum(axis=1), np.float32(1))
+        across, down = self._across * seen, self._down * seen
+
+        def mean(one: Singles, other: Singles) -> Singles:
+            return np.asarray(np.einsum("ij,ij->i", one, other) / count)
+
+        # covariances within a block: the views' brightness may differ from place to place
+        mean_across, mean_down = mean(across, seen), mean(down, seen)
+        varies = mean(across, across) - np.square(mean_across) + np.float32(_RIDGE)
+        self._mixed = (mean(across, down) - mean_across * mean_down) / varies
+        weight = mean(down, down) - np.square(mean_down) - np.square(self._mixed) * varies
+        weight[(weight <= _LEAST) | (count <= _KNOWN * BLOCK**2)] = 0
+        along = across - mean_across[:, None] * seen
+        share = down - mean_down[:, None] * seen - self._mixed[:, None] * along
+        self._share = share / (np.maximum(weight, np.float32(_LEAST)) * count)[:, None]
+        self._shift_along = along / (varies * count)[:, None]
+        self._weight = np.minimum(weight, np.float32(_MOST))
+        self._x, self._y = mean(x, seen), mean(y, seen)
 
     def vertical(self, at: Misalignment) -> row_fit.SeenBlocks:
         """Return the vertical disparities that are left when the right view is levelled by `at`."""
@@ -237,10 +224,9 @@ class _Blocks:
         off = self._left - grey
         # else steps of less than a 64th of a pixel are none, or one, and measuring does not settle
         off -= self._across * (u - read_u) + self._down * (v - read_v)
-        shift = np.einsum("ij,ij->i", self._shares.share, off)
-        self._along = np.einsum("ij,ij->i", self._shares.along, off)
-        shares, telling = self._shares, self._shares.weight > 0
-        told = shares.x, shares.y, self._near, shift, shares.weight
+        shift = np.einsum("ij,ij->i", self._share, off)
+        self._along = np.einsum("ij,ij->i", self._shift_along, off)
+        told, telling = (self._x, self._y, self._near, shift, self._weight), self._weight > 0
         return row_fit.SeenBlocks(*(each[telling] for each in told))
 
     def follow(self, step: Misalignment) -> None:
@@ -249,18 +235,15 @@ class _Blocks:
         A disparity that was matched in the wrong row is wrong by what hides that. Noise in the gradients lets
         least squares take up a part of it only: without this, a fifth to a half stays hidden.
         """
-        down = step.down(self._shares.x, self._shares.y, self._near)
-        moved = np.clip(self._along - self._shares.mixed * down, -_LONGEST_STEP, _LONGEST_STEP)
+        down = step.down(self._x, self._y, self._near)
+        moved = np.clip(self._along - self._mixed * down, -_LONGEST_STEP, _LONGEST_STEP)
         self._u += moved[:, None]
 
 
 def _gradients(view: Singles) -> tuple[Singles, Singles]:
     """Grey levels per pixel along the rows and down the columns."""
-    across, down = (
-        cv2.Sobel(view, cv2.CV_32F, *order, ksize=3, scale=0.125).astype(np.float32, copy=False)
-        for order in ((1, 0), (0, 1))
-    )
-    return across, down
+    across, down = (cv2.Sobel(view, cv2.CV_32F, *order, ksize=3, scale=0.125) for order in ((1, 0), (0, 1)))
+    return across.astype(np.float32, copy=False), down.astype(np.float32, copy=False)
 
 
 class Tolerance(NamedTuple):
@@ -353,8 +336,7 @@ def seen_from_right(disparity: Map) -> Map:
     seen[v[order], at[order]] = known[order]
     around = _AROUND, _AROUND
     share = cv2.blur((seen > 0).astype(np.float32), around)
-    smooth: Map = np.divide(cv2.blur(seen, around), np.maximum(share, np.float32(1e-3)), dtype=np.float32)
-    return smooth
+    return np.divide(cv2.blur(seen, around), np.maximum(share, np.float32(1e-3)), dtype=np.float32)
 
 
 class Approach:

@@ -114,22 +114,20 @@ class Misalignment:
         lower, clockwise, larger, twist = values
         return Misalignment(lower, math.radians(clockwise), larger / 100, twist / (height * width / 4))
 
-    def matrix(
-        self, height: int, width: int, larger: float | None = None, axis: tuple[float, float] = (0.0, 0.0)
-    ) -> list[list[float]]:
+    def matrix(self, height: int, width: int, larger: float, axis: tuple[float, float]) -> list[list[float]]:
         """Return the affine map from pixels (u, v, 1) of a level view to the given one, without twist.
 
         Parameters
         ----------
         height, width : int
             Of the views, px.
-        larger : float, optional
-            The scale of the columns, where it is not that of the rows.
+        larger : float
+            The scale of the columns.
         axis : tuple of float
             What keeps its column, px from the middle: the right view's principal point.
         """
         x, y = (width - 1) / 2, (height - 1) / 2
-        across, down = 1 + (self.scale if larger is None else larger), 1 + self.scale
+        across, down = 1 + larger, 1 + self.scale
         kept = (1 - across) * axis[0] + self.rotation * axis[1]
         return [
             [across, -self.rotation, x - across * x + self.rotation * y + kept],

@@ -138,12 +138,10 @@ def _found(views: Views, planes: _Planes, rows: slice, lies: Misalignment) -> Si
     weight *= ((1 - across) * (power + 2 * ridge) / np.square(power + ridge))[:, None]
     shift: Singles = np.zeros_like(row)
     for _ in range(_ROUNDS):
-        seen = (
-            sampling.sampled(right, u, v, cv2.INTER_LINEAR)
-            if lies == LEVEL
-            else sampling.grey_between(right, u, v)[2]
-        )
-        off = seen - grey
+        if lies == LEVEL:
+            off = sampling.sampled(right, u, v, cv2.INTER_LINEAR) - grey
+        else:
+            off = sampling.grey_between(right, u, v)[2] - grey
         step = np.clip(np.einsum("ij,ij->i", weight, off), -_LONGEST_STEP, _LONGEST_STEP)
         u -= step[:, None]
         shift += step

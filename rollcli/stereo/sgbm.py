@@ -45,8 +45,8 @@ def without_lag(disparity: Map, mode: str) -> NDArray[np.float32]:
     filled = np.where(known > 0, lags, cv2.blur(lags, (_AROUND, _AROUND)) / np.maximum(around, 1e-3))
     added = cv2.resize(filled, (width, height), interpolation=cv2.INTER_LINEAR).astype(np.float32, copy=False)
     added *= disparity > 0
-    corrected: Map = np.add(disparity, added, out=added)
-    return corrected
+    added += disparity
+    return added
 
 
 _MODES = {

@@ -98,8 +98,7 @@ def _brighter(dark: NDArray[np.float64], bright: NDArray[np.float64]) -> View:
     to = np.bincount(same, bright) / np.bincount(same)
     at, to = np.append(at, 256), np.append(to, 256 * to[-1] / at[-1])
     curve = np.interp(np.arange(256), np.append(0, at), np.append(0, to))
-    levels: View = np.minimum(np.rint(curve), 255).astype(np.uint8)
-    return levels
+    return np.asarray(np.minimum(np.rint(curve), 255), np.uint8)
 
 
 _OUTSIDE = 0.01  # share of the pixels that may be darker, and brighter: lamps are
@@ -137,8 +136,7 @@ def _spread(levels: NDArray[Any], white: int, most: float) -> View | None:
     brightest = min(brightest, darkest + round(most * 255 * share))
     every = np.arange(np.iinfo(levels.dtype).max + 1)
     become = np.interp(every, (0, first, last, white), (0, darkest, brightest, 255))
-    curve: View = np.rint(become).astype(np.uint8)
-    return curve
+    return np.asarray(np.rint(become), np.uint8)
 
 
 # times as much of it, from which on a view is smoothed: none of 79 real pairs differs by more than 1.22, and

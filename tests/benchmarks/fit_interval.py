@@ -18,7 +18,7 @@ from matched import matched
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.estimator.interval import jackknife, noise_of
+from rollcli.estimator.interval import jackknife
 from rollcli.estimator.moments import CheckedMap
 from rollcli.estimator.request import DEFAULT_REQUEST
 from rollcli.estimator.road.pixels import select_pixels
@@ -45,7 +45,7 @@ def terms(frames: int, seeds: tuple[int, int], roughness: str | None) -> tuple[n
             knife = jackknife(surface, theta, tuning)
             low, high = lane_rolls_of(spec) if roughness else (spec.roll, spec.roll)
             error = max(0.0, low - theta, theta - high)
-            rows.append((error, noise_of(knife, theta, tuning), knife.uneven, tuning.bend * knife.bend))
+            rows.append((error, knife.noise(theta, tuning), knife.uneven, tuning.bend * knife.bend))
             kinds.append(f"class {roughness}" if roughness else f"{scene} {section}")
     return np.degrees(rows), kinds
 

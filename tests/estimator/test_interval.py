@@ -112,7 +112,9 @@ def knife(bands=(0.0,), columns=(0.0,), white=0.0, freedom=(5.0, 5.0), **parts):
 
 @pytest.mark.parametrize("freedom", range(1, 13))
 def test_groups_widen_it_as_students_t_does(freedom):
-    bands, columns, _ = knife(bands=(0.003, -0.004), columns=(2,), freedom=(freedom, freedom)).spreads()
+    known = (freedom, freedom)
+    bands = knife(bands=(0.003, -0.004), freedom=known).noise(0.0, TUNING.interval)
+    columns = knife(columns=(2,), freedom=known).noise(0.0, TUNING.interval)
     # of t 2.5 % lie beyond the quantile
     assert stats.t.cdf(bands / 0.005, freedom) == pytest.approx(0.975, abs=2e-5)
     assert columns / 2 == pytest.approx(bands / 0.005)

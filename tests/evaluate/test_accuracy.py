@@ -46,13 +46,13 @@ def test_heights_are_compared_at_their_distances_where_all_that_takes_is_there(t
 
 def test_an_error_of_just_the_limit_is_not_above_it_and_just_of_the_interval_is_inside():
     level = {f"frame{k}": KnownPose(0.0) for k in (1, 2, 3)}
-    found = assess(rows(0.5, -0.5, 0.25, ci95=0.5), level)
+    found = assess(rows(0.5, -0.5, 0.25, ci95=0.5), level, "rolls.csv")
     assert (found.roll.share_above_0_5_deg, found.roll.coverage_95) == (0, 1)
     assert (found.roll.worst, found.roll.worst_file) == (0.5, "maps/frame1.png")
     given = dataclasses.replace(rows(0.0)[0], pitch_deg=0.5, pitch_ci95_deg=0.5)
-    assert assess([given], {"frame1": KnownPose(0.0, 0.0)}).pitch.coverage_95 == 1
+    assert assess([given], {"frame1": KnownPose(0.0, 0.0)}, "").pitch.coverage_95 == 1
     unsure = dataclasses.replace(given, pitch_ci95_deg=None)
-    assert assess([unsure], {"frame1": KnownPose(0.0, 0.0)}).pitch.coverage_95 is None
+    assert assess([unsure], {"frame1": KnownPose(0.0, 0.0)}, "").pitch.coverage_95 is None
 
 
 def test_the_worst_height_is_the_worst_of_all_pixels(tmp_path):

@@ -27,7 +27,7 @@ TURNS = [math.radians(turn) for turn in (-10, 0, 15)]
 
 @pytest.fixture(scope="module")
 def found():
-    return examine("a.png", bent_road(3, width=240, height=160, noise=0.1), TURNS)
+    return examine("a.png", bent_road(3, width=240, height=160, noise=0.1), TURNS, None, chosen=False)
 
 
 @pytest.mark.parametrize("turn_deg", [-90, -37, -20, -2, 0, 4, 20, 90])
@@ -53,7 +53,7 @@ def test_every_method_follows_the_rotations(found):
 
 def test_a_method_without_an_angle_is_counted_and_leaves_the_others_alone():
     upward = bent_road(180, width=120, height=90)  # no road: disparity grows upward
-    found = examine("a", upward, [0.0])
+    found = examine("a", upward, [0.0], None, chosen=False)
     assert found.method_errors["areas"] == (None,)
     assert found.method_errors["line"][0] is not None
     methods = all_tables([found], [], [time_solvers(upward)])["methods_accuracy"]
@@ -63,7 +63,7 @@ def test_a_method_without_an_angle_is_counted_and_leaves_the_others_alone():
 
 def test_a_map_without_an_angle_is_refused():
     with pytest.raises(EstimationError):
-        examine("a", np.zeros((50, 60)), TURNS)
+        examine("a", np.zeros((50, 60)), TURNS, None, chosen=False)
 
 
 def made_times(seconds):
@@ -91,4 +91,4 @@ def test_a_time_is_that_of_the_fastest_run():
 
 def test_solvers_are_timed_on_pixels_of_two_rows_which_determine_no_parabola():
     two_rows = np.array([[20.0, 20.3], [20.4, 20.6]])
-    assert examine("a", two_rows, [0.0]).pixels == time_solvers(two_rows).pixels == 4
+    assert examine("a", two_rows, [0.0], None, chosen=False).pixels == time_solvers(two_rows).pixels == 4

@@ -46,7 +46,7 @@ def _found():
     holed = bent_road(-7, width=66, height=60, noise=0.2, seed=2)
     holed[20:30, :40] = 0
     return (
-        examine("curved.png", curved, TURNS),
+        examine("curved.png", curved, TURNS, None, chosen=False),
         examine("holed.png", holed, TURNS[1:], math.radians(-7.1), chosen=True),
     )
 
@@ -93,7 +93,7 @@ def _compared(form):
         for k, (stem, pose) in enumerate(truth.items())
     ]
     rows[3] = Row("maps/f3.png", status="error")
-    found = assess([*rows[:20], Row("maps/other.png", status="ok", roll_deg=1.0)], truth)
+    found = assess([*rows[:20], Row("maps/other.png", status="ok", roll_deg=1.0)], truth, "rolls.csv")
     return found if form is None else form(found)
 
 

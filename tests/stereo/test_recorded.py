@@ -194,7 +194,7 @@ CASES = {
         LIES.times(2.0),
         LIES.shifts(100, 300),
         math.degrees(LIES.rotation),
-        LIES.matrix(100, 300),
+        LIES.matrix(100, 300, LIES.scale, (0.0, 0.0)),
         Misalignment.of_values((1.5, -0.5, 0.4, 2.0), 100, 300),
     ],
 }
