@@ -1,6 +1,5 @@
 """How the right view of a pair lies: its vertical disparity measured, and views levelled by it."""
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -10,9 +9,9 @@ import numpy as np
 
 from rollcli.estimator.moments import Singles
 from rollcli.stereo import row_fit, sampling
-from rollcli.stereo.misalignment import LEVEL, ColumnSupport, Misalignment
+from rollcli.stereo.misalignment import LEVEL, TOLERANCE, ColumnSupport, Misalignment
 from rollcli.stereo.sampling import BLOCK
-from rollcli.stereo.views import Map, View, Views, resampled, shrink_both
+from rollcli.stereo.views import Map, View, Views, resampled, shrink_both, size_factor
 
 _KNOWN = 0.7  # share of a block that has to have a disparity
 _BORDER = 1.0  # px: what lies nearer to the right view's border, or beyond, is not compared
@@ -139,7 +138,7 @@ def measure_misalignment(
         blocks.follow(step)
         enough = _SMALL_STEP if done < _UNSURE_FROM else _UNSURE_STEP
         # or the views would be level even if most of how they lie were still hidden
-        if reach < enough or is_level(found.times(_HIDDEN), fit.errors, disparity.shape):
+        if reach < enough or TOLERANCE.allows(found.times(_HIDDEN), fit.errors, disparity.shape):
             break
     height, width = disparity.shape
     rows = row_fit.MeasuredRows(seen, before, (height, width))
@@ -246,40 +245,6 @@ def _gradients(view: Singles) -> tuple[Singles, Singles]:
     return across.astype(np.float32, copy=False), down.astype(np.float32, copy=False)
 
 
-class Tolerance(NamedTuple):
-    """What is level enough, beside some standard errors of what was measured.
-
-    Level rendered pairs measure up to 0.03 px, 0.008 degrees, 0.04 % and 0.18 px; empty roads with much noise
-    up to 0.08 px, 0.024 degrees, 0.07 % and 0.24 px, with standard errors of a sixth of that.
-
-    Attributes
-    ----------
-    offset : float
-        Pixels; turns a road by 0.03 degrees.
-    rotation : float
-        Radians (0.014 degrees); turns a road by 0.03 degrees.
-    scale : float
-        Turns a road by 0.08 degrees.
-    twist : float
-        Pixels in the corners; turns a road by 0.03 degrees.
-    tilt : float
-        Pixels at a disparity of a sixteenth of the width.
-    curve : float
-        Pixels in the first and last row.
-    sure : float
-        Standard errors. Blocks beside each other err together: they are said to err less than they do.
-    """
-
-    offset: float = 0.06
-    rotation: float = 0.00025
-    scale: float = 0.0003
-    twist: float = 0.15
-    tilt: float = 0.1
-    curve: float = 0.1
-    sure: float = 4.0
-
-
-TOLERANCE = Tolerance()
 _MEASURED_AT = 120_000  # px: larger views are measured at this size: right to a fifth of the tolerance
 _WHOLE_FROM = 1.5  # times smaller: from here on a whole number, since means of whole pixels are quick
 # px, once a pair is matched: the whole of most views. A level road of fine grain seems 0.06 % larger at
@@ -288,16 +253,6 @@ _CLOSER = 480_000
 _FURTHEST = 2.0  # times the last change; further away, two measurements do not tell
 _NO_CHANGE = 1e-6  # px^2
 _AROUND = 7  # px of a small map: what is smoothed; a tilt moves by 0.3 px at most, and this is a tenth of it
-
-
-def is_level(
-    lies: Misalignment, errors: Misalignment, shape: tuple[int, ...], tolerance: Tolerance = TOLERANCE
-) -> bool:
-    """Tell whether views of this shape that lie so, with these standard errors, are within a tolerance."""
-    *most, sure = tolerance
-    units = 1, 1, 1, *Misalignment(twist=1, tilt=1, curve=1).shifts(*shape)[3:]
-    parts = zip(lies.parts, errors.parts, most, units, strict=True)
-    return all(abs(value) < limit / unit + sure * error for value, error, limit, unit in parts)
 
 
 def level(right: View, misalignment: Misalignment, near: Map | None = None) -> View:
@@ -362,11 +317,6 @@ class Approach:
         share = float(np.dot(left.shifts(*self._shape), change) / (np.dot(change, change) + _NO_CHANGE))
         share = max(-_FURTHEST, min(_FURTHEST, share))
         return measured - (measured - measured_before).times(share)
-
-
-def size_factor(shape: tuple[int, ...], pixels: int) -> float:
-    """Return the factor that shrinks a view of this shape to that many pixels; 1 if it has no more."""
-    return max(1.0, math.sqrt(shape[0] * shape[1] / pixels))
 
 
 class SmallViews:

@@ -7,21 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.stereo.alignment import (
-    Approach,
-    Measured,
-    SmallViews,
-    Texture,
-    Tolerance,
-    is_level,
-    level,
-    measure_misalignment,
-    size_factor,
-)
-from rollcli.stereo.misalignment import LEVEL, Misalignment
+from rollcli.stereo.alignment import Approach, Measured, SmallViews, Texture, level, measure_misalignment
+from rollcli.stereo.misalignment import LEVEL, Misalignment, Tolerance
 from rollcli.stereo.options import StereoOptions
 from rollcli.stereo.sgbm import NARROWEST, match_views, usable_range
-from rollcli.stereo.views import Map, Views, shrink_both
+from rollcli.stereo.views import Map, Views, shrink_both, size_factor
 
 _RANGE_ROUNDS = 4
 # Times the largest disparity that are searched; and the share of these within which it has to lie
@@ -115,7 +105,7 @@ def first_look(small: SmallViews) -> FirstLook:
     first = _look(views, texture, LEVEL)
     seen = None if first is None or first.measured is None else first.measured.resized(factor)
     telling = seen is not None and seen.errors.offset <= _TELLING_ERROR
-    if seen and telling and is_level(seen.misalignment, seen.errors, small.shape, _AS_GOOD_AS_LEVEL):
+    if seen and telling and _AS_GOOD_AS_LEVEL.allows(seen.misalignment, seen.errors, small.shape):
         return _seen(first, factor, replace(seen, misalignment=LEVEL))  # as far as small views tell
     first = _climb(views, texture, LEVEL, first)
     look, sure = _closer(small, first, factor)

@@ -12,19 +12,10 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 from rollcli.estimator.road.find import road_plane
-from rollcli.stereo.alignment import (
-    TOLERANCE,
-    Approach,
-    Measured,
-    SmallViews,
-    Tolerance,
-    is_level,
-    level,
-    textured_share,
-)
+from rollcli.stereo.alignment import Approach, Measured, SmallViews, level, textured_share
 from rollcli.stereo.along_road import FindRoad, Levelled
 from rollcli.stereo.first_look import FirstLook, first_look, look_for_range
-from rollcli.stereo.misalignment import LEVEL, NOTHING_KNOWN, ColumnSupport, Misalignment
+from rollcli.stereo.misalignment import LEVEL, NO_SUPPORT, TOLERANCE, ColumnSupport, Misalignment, Tolerance
 from rollcli.stereo.options import StereoOptions as StereoOptions
 from rollcli.stereo.refinement import refined
 from rollcli.stereo.sgbm import NARROWEST, usable_range
@@ -301,7 +292,7 @@ def match_pair(
         if measured is not None:
             lies, errors = measured.misalignment, measured.errors
             # but for what refinement takes away
-            if is_level(lies - corrected, errors, views[0].shape, _KEPT._replace(sure=4.0)):
+            if _KEPT._replace(sure=4.0).allows(lies - corrected, errors, views[0].shape):
                 corrected = told.of_pair(lies.offset, errors.offset).rounded(*views[0].shape)
             else:
                 doubt = CONTRADICTS
@@ -314,9 +305,9 @@ def match_pair(
     if grows and end_fraction > MUCH_AT_END and options.num_disparities is None and not again:
         return match_pair(left, right, options, find_road, replace(look, range=first + 2 * count))
     if corrected == LEVEL:
-        support = NOTHING_KNOWN
+        support = NO_SUPPORT
     elif support is None:
-        support = NOTHING_KNOWN if measured is None else measured.support
+        support = NO_SUPPORT if measured is None else measured.support
     if support.error > _OPEN_COLUMNS and not doubt:
         doubt = NOT_TOLD_BY_ROWS
     if support.pitch_error > _OPEN_PITCH and not doubt:
@@ -325,7 +316,7 @@ def match_pair(
     lies = corrected
     if corrected == LEVEL and measured is not None and not doubt:  # too little to level the view for
         seen = Misalignment(*measured.misalignment.parts[:2])
-        lies = LEVEL if is_level(seen, measured.errors, views[0].shape, _AS_GIVEN) else seen
+        lies = LEVEL if _AS_GIVEN.allows(seen, measured.errors, views[0].shape) else seen
 
     def finished(found: Map) -> Map:
         return _with_believed_columns(refined(found, views, lies), corrected, support)
@@ -351,14 +342,14 @@ def _match_levelled(
 ) -> tuple[Map, Misalignment, Measured | None, str]:
     """Match once the views are level; the map, what was corrected and measured, and why it may be wrong."""
     seen, shape, looked_at = look.measured, small.shape, LEVEL
-    if seen is not None and not is_level(seen.misalignment, seen.errors, shape):
+    if seen is not None and not TOLERANCE.allows(seen.misalignment, seen.errors, shape):
         looked_at = seen.misalignment
     wanted, approach = looked_at, Approach(shape)
     for matched in range(_MATCHES):
         at = wanted
         disparity = match(at)
         measured = small.closer.measure(disparity, at, _ROUNDS, every=2) if at == LEVEL else None
-        if measured is None or not is_level(measured.misalignment, measured.errors, shape, _LEVEL_BY_HALF):
+        if measured is None or not _LEVEL_BY_HALF.allows(measured.misalignment, measured.errors, shape):
             measured = small.closer.measure(disparity, at, _ROUNDS)
         if not any_scene:
             check_same_scene(small, look, measured)
@@ -367,12 +358,12 @@ def _match_levelled(
         # where this measurement and that before it lead to; level if either is
         lies, errors = measured.misalignment, measured.errors
         wanted = approach.next(at, lies)
-        if is_level(lies, errors, shape) or is_level(wanted, errors, shape):
+        if TOLERANCE.allows(lies, errors, shape) or TOLERANCE.allows(wanted, errors, shape):
             wanted = LEVEL
         if wanted == at:
             return disparity, at, measured, _doubt(at, errors)
         left = (lies - at).times(measured.spread / _KEPT_SPREAD)
-        if wanted != LEVEL and is_level(left, errors, shape, _KEPT):  # refinement does the rest
+        if wanted != LEVEL and _KEPT.allows(left, errors, shape):  # refinement does the rest
             return disparity, lies, measured, _doubt(lies, errors)
         if matched == 1 and looked_at != LEVEL:  # which may have led astray
             wanted, approach = LEVEL, Approach(shape)
@@ -402,7 +393,7 @@ def _with_believed_columns(disparity: Map, matched: Misalignment, support: Colum
     support : ColumnSupport
         What is in the columns.
     """
-    if support == NOTHING_KNOWN and not matched.scale:
+    if support == NO_SUPPORT and not matched.scale:
         return disparity
     height, width = disparity.shape
     u = np.arange(width, dtype=np.float32) - np.float32((width - 1) / 2)

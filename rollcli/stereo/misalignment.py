@@ -6,7 +6,7 @@ Import-light.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 _SAME = 2.0**-10  # px: two misalignments that differ by less anywhere are one
 _NEAR = 1 / 16  # of the width of a view: the disparity of what is near, where a shift by a tilt is told
@@ -139,6 +139,49 @@ class Misalignment:
 LEVEL = Misalignment()
 
 
+class Tolerance(NamedTuple):
+    """What is level enough, beside some standard errors of what was measured.
+
+    Level rendered pairs measure up to 0.03 px, 0.008 degrees, 0.04 % and 0.18 px; empty roads with much noise
+    up to 0.08 px, 0.024 degrees, 0.07 % and 0.24 px, with standard errors of a sixth of that.
+
+    Attributes
+    ----------
+    offset : float
+        Pixels; turns a road by 0.03 degrees.
+    rotation : float
+        Radians (0.014 degrees); turns a road by 0.03 degrees.
+    scale : float
+        Turns a road by 0.08 degrees.
+    twist : float
+        Pixels in the corners; turns a road by 0.03 degrees.
+    tilt : float
+        Pixels at a disparity of a sixteenth of the width.
+    curve : float
+        Pixels in the first and last row.
+    sure : float
+        Standard errors. Blocks beside each other err together: they are said to err less than they do.
+    """
+
+    offset: float = 0.06
+    rotation: float = 0.00025
+    scale: float = 0.0003
+    twist: float = 0.15
+    tilt: float = 0.1
+    curve: float = 0.1
+    sure: float = 4.0
+
+    def allows(self, lies: Misalignment, errors: Misalignment, shape: tuple[int, ...]) -> bool:
+        """Tell whether views of this shape that lie so, with these standard errors, are level enough."""
+        *most, sure = self
+        units = 1, 1, 1, *Misalignment(twist=1, tilt=1, curve=1).shifts(*shape)[3:]
+        parts = zip(lies.parts, errors.parts, most, units, strict=True)
+        return all(abs(value) < limit / unit + sure * error for value, error, limit, unit in parts)
+
+
+TOLERANCE = Tolerance()
+
+
 @dataclass(frozen=True)
 class ColumnSupport:
     """What is believed of how the columns lie: a point (x, y) lies ``x (scale + twist x + pitch y)`` further.
@@ -166,7 +209,7 @@ class ColumnSupport:
         return replace(self, twist=self.twist / factor, pitch=self.pitch / factor)
 
 
-NOTHING_KNOWN = ColumnSupport(0.0, 0.0, 0.0, 0.0, 0.0)
+NO_SUPPORT = ColumnSupport(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def advice_of(lower: float, clockwise: float, larger: float, twist: float) -> str:

@@ -1,5 +1,6 @@
 """The two views of a pair as they are matched: grey, 8 bits, at one size."""
 
+import math
 from typing import Any
 
 import cv2
@@ -207,6 +208,11 @@ def matched_shape(shape: tuple[int, ...], downscale: float) -> tuple[int, int]:
     """Return the shape that an image of this shape is matched at."""
     height, width = (max(1, round(side / downscale)) for side in shape[:2])
     return height, width
+
+
+def size_factor(shape: tuple[int, ...], pixels: int) -> float:
+    """Return the factor that shrinks a view of this shape to that many pixels; 1 if it has no more."""
+    return max(1.0, math.sqrt(shape[0] * shape[1] / pixels))
 
 
 _HALVED_FROM = 4  # times smaller: views are halved first; means of four pixels take a thirtieth of the time

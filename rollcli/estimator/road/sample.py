@@ -156,7 +156,7 @@ def take_sample(
     with_data = count(jumps < NO_STEP)
     for _ in range(2):  # again without the noise, which has another median
         noise = max(tuning.noise_share * typical, quantum / math.sqrt(12))
-        tolerance = tolerance_of(few_d, noise, tuning)
+        tolerance = tolerances(few_d, noise, tuning)
         agree = count(jumps <= tolerance)
         coherent = (agree > 0) & (2 * agree >= with_data)
         if coherent.any():
@@ -166,7 +166,7 @@ def take_sample(
         x=x,
         y=y,
         d=d,
-        tolerance=tolerance_of(d, noise, tuning),
+        tolerance=tolerances(d, noise, tuning),
         places=places,
         few=few,
         column=column[few],
@@ -246,7 +246,7 @@ def reach_of(height: int, width: int, tuning: SampleTuning) -> int:
     return min(wanted, max(1, min(height, width) // 8))
 
 
-def tolerance_of(d: NDArray[Any], noise: float, tuning: SampleTuning) -> Singles:
+def tolerances(d: NDArray[Any], noise: float, tuning: SampleTuning) -> Singles:
     """Return how far each pixel of a road may be off, px."""
     return np.asarray(np.sqrt(np.float32(noise) ** 2 + np.square(np.float32(tuning.uneven_share) * d)))
 

@@ -21,15 +21,7 @@ from rollcli.estimator.moments import Bools, Floats, Grid, Singles, powers, solv
 from rollcli.estimator.request import Request
 from rollcli.estimator.road.find import HARDLY_A_PIXEL, Road, agreement
 from rollcli.estimator.road.model import Reals, RoadModel
-from rollcli.estimator.road.sample import (
-    Sample,
-    count,
-    medians_of,
-    quantile,
-    reach_of,
-    steps_to,
-    tolerance_of,
-)
+from rollcli.estimator.road.sample import Sample, count, medians_of, quantile, reach_of, steps_to, tolerances
 from rollcli.estimator.tuning import FitTuning, Tuning
 
 MOST_FADED = 30.0  # as exp(-30): products of such weights are no denormals, which take ten times as long
@@ -111,7 +103,7 @@ class Surface:
         rows, columns = (np.arange(side, dtype=np.float64) for side in disparity.shape)
         x, y = self.grid.normalised(columns, rows[:, None] + first)
         road = self.model.disparity(x, y)
-        tolerance = tolerance_of(disparity, self.noise, tuning.sample)
+        tolerance = tolerances(disparity, self.noise, tuning.sample)
         on_it: Bools = np.abs(road - disparity) < self.limit * tolerance
         if self.level is not None:
             side = self.model.side(self.model.across(x, y), road)
