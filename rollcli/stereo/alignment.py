@@ -11,7 +11,7 @@ from rollcli.estimator.moments import Singles
 from rollcli.stereo import row_fit, sampling
 from rollcli.stereo.misalignment import LEVEL, TOLERANCE, ColumnSupport, Misalignment
 from rollcli.stereo.sampling import BLOCK
-from rollcli.stereo.views import Map, View, Views, resampled, shrink_both, size_factor
+from rollcli.stereo.views import Map, View, Views, resampled, resized, shrink_both, size_factor
 
 _KNOWN = 0.7  # share of a block that has to have a disparity
 _BORDER = 1.0  # px: what lies nearer to the right view's border, or beyond, is not compared
@@ -272,8 +272,7 @@ def level(right: View, misalignment: Misalignment, near: Map | None = None) -> V
     v = np.arange(height, dtype=np.float32)[:, None]
     far: Map | float = 0.0
     if near is not None and misalignment.tilt:
-        far = cv2.resize(near, (width, height), interpolation=cv2.INTER_LINEAR).astype(np.float32, copy=False)
-        far *= np.float32(width / near.shape[1])
+        far = resized(near, (width, height), cv2.INTER_LINEAR) * np.float32(width / near.shape[1])
     at_u, at_v = sampling.seen_at(misalignment, u, v, right.shape, far)
     return sampling.sampled(right, at_u, at_v, cv2.INTER_CUBIC)
 

@@ -16,7 +16,7 @@ from rollcli.stereo import sampling
 from rollcli.stereo.misalignment import LEVEL, Misalignment
 from rollcli.stereo.sampling import BLOCK
 from rollcli.stereo.sgbm import STEEPEST
-from rollcli.stereo.views import Views
+from rollcli.stereo.views import Views, resized
 
 _KNOWN = 0.7  # share of a block that has to have a disparity: else its mean is not that of its middle
 # px: how far the mean of the four blocks around may lie off; further is an edge. At half of it the noisy
@@ -152,5 +152,4 @@ def _between(blocks: Singles) -> Singles:
     """Return values of blocks at every pixel, interpolated between their middles."""
     wider = np.pad(blocks, 1, mode="reflect", reflect_type="odd")
     size = wider.shape[1] * BLOCK, wider.shape[0] * BLOCK
-    smooth = cv2.resize(wider, size, interpolation=cv2.INTER_LINEAR)[BLOCK:-BLOCK, BLOCK:-BLOCK]
-    return smooth.astype(np.float32, copy=False)
+    return resized(wider, size, cv2.INTER_LINEAR)[BLOCK:-BLOCK, BLOCK:-BLOCK]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rollcli.estimator.moments import Bools, Singles
 from rollcli.stereo.misalignment import LEVEL, Misalignment
-from rollcli.stereo.views import Map, View
+from rollcli.stereo.views import Map, View, resized
 
 _Number = TypeVar("_Number", np.float32, np.uint8)
 
@@ -34,8 +34,7 @@ def block_means(pixels: Singles) -> Singles:
     """Return the means of the blocks that fit into an image, shape (H // BLOCK, W // BLOCK)."""
     height, width = (side // BLOCK for side in pixels.shape)
     whole = pixels[: height * BLOCK, : width * BLOCK]
-    means = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
-    return means.astype(np.float32, copy=False)
+    return resized(whole, (width, height), cv2.INTER_AREA)
 
 
 def blocks_at(pixels: NDArray[_Number], places: Bools) -> NDArray[_Number]:

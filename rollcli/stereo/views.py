@@ -1,7 +1,7 @@
 """The two views of a pair as they are matched: grey, 8 bits, at one size."""
 
 import math
-from typing import Any
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 from rollcli.estimator.moments import Bools, Singles
+
+_Number = TypeVar("_Number", np.float32, np.uint8)
 
 View = NDArray[np.uint8]
 """Shape (H, W)."""
@@ -252,10 +254,13 @@ def shrink_both(views: Views, factor: float) -> Views:
 def _third(view: View, factor: float) -> View:
     """Shrink a view to about a third: means of nine pixels about each point take a quarter of areas' time."""
     height, width = matched_shape(view.shape, factor)
-    means = cv2.blur(view, (3, 3))
-    return cv2.resize(means, (width, height), interpolation=cv2.INTER_LINEAR_EXACT).astype(
-        np.uint8, copy=False
-    )
+    means = cv2.blur(view, (3, 3)).astype(np.uint8, copy=False)
+    return resized(means, (width, height), cv2.INTER_LINEAR_EXACT)
+
+
+def resized(pixels: NDArray[_Number], size: tuple[int, int], how: int) -> NDArray[_Number]:
+    """Return an image at another size, width and height, as OpenCV interpolates it."""
+    return cv2.resize(pixels, size, interpolation=how).astype(pixels.dtype, copy=False)
 
 
 def resampled(disparity: Map, shape: tuple[int, ...]) -> Map:
@@ -265,12 +270,9 @@ def resampled(disparity: Map, shape: tuple[int, ...]) -> Map:
     size = shape[1], shape[0]
     scale = np.float32(shape[1] / disparity.shape[1])
     if scale < 1:  # one pixel of a few says the same, and edges stay edges
-        fewer: Map = cv2.resize(disparity, size, interpolation=cv2.INTER_NEAREST) * scale
-        return fewer
-    known = cv2.resize((disparity > 0) * np.uint8(255), size, interpolation=cv2.INTER_LINEAR)
-    larger: Map = cv2.resize(disparity * scale, size, interpolation=cv2.INTER_LINEAR).astype(
-        np.float32, copy=False
-    )
+        return resized(disparity, size, cv2.INTER_NEAREST) * scale
+    known = resized((disparity > 0) * np.uint8(255), size, cv2.INTER_LINEAR)
+    larger = resized(disparity * scale, size, cv2.INTER_LINEAR)
     larger *= known == 255
     return larger
 
