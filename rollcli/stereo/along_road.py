@@ -7,7 +7,7 @@ a few disparities are enough. What lies further off the plane is known from the 
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -121,8 +121,7 @@ class Levelled:
         count = usable_range(width, first, left.shape[1], self.options.block_size)
         if count < NARROWEST:
             return None
-        options = replace(self.options, speckle_size=self.options.speckle_size // _SMALLER**2)
-        disparity = match_views(views, first, count, options)
+        disparity = match_views(views, first, count, self.options.for_smaller(_SMALLER))
         if self.blank is not None:
             size = left.shape[1], left.shape[0]
             disparity[cv2.resize(self.blank.view(np.uint8), size, interpolation=cv2.INTER_AREA) != 0] = 0

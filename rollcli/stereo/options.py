@@ -115,6 +115,10 @@ class StereoOptions:
         given = replace(self, downscale=1.0, align="auto", vertical_offset=None)
         return given == StereoOptions()
 
+    def for_smaller(self, factor: int) -> "StereoOptions":
+        """Return these options for views `factor` times smaller."""
+        return replace(self, speckle_size=self.speckle_size // factor**2)
+
     @property
     def checks_alignment(self) -> bool:
         """Whether what a file says is compared with what the views show."""

@@ -121,3 +121,7 @@ def test_pixels_beside_holes_are_raised_like_those_around(farthest):
 def test_a_small_map_stays_as_it_is():
     small = np.full((8, 8), 3, np.float32)
     assert without_lag(small, StereoOptions().mode) is small
+
+
+def test_a_smaller_view_has_speckles_of_as_much_less_area():
+    assert StereoOptions(speckle_size=180).for_smaller(3).speckle_size == 20
