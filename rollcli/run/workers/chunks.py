@@ -6,11 +6,11 @@ tasks: in their order, and the same for any chunks.
 """
 
 import itertools
-import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from threading import Event
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from rollcli.errors import RollcliError, raised_at
 from rollcli.files.stores.locations import computing
@@ -29,7 +29,7 @@ _CHUNKS_A_SECOND = 100
 _MOST_S = 8.0
 # a worker gives back what it has not begun by then: tasks may be slower than those before
 _LONGEST_S = 2.0
-LONGEST_ON_CLUSTER_S = 2 * _MOST_S
+_LONGEST_OF_PARTS_S = 2 * _MOST_S  # of those that belong together, and on a cluster
 _SHARES = 2  # a chunk is at most this part of what each worker still has to do, so that all end together,
 _LEAST_S = 0.05  # unless that is less than this, or than half of what _CHUNKS_A_SECOND allows
 _DOUBT_S = 0.02  # added to what the first tasks took: one that fails at once says nothing of the others
@@ -58,6 +58,25 @@ class Span(list[Task]):
 
 def _as_they_are(chunk: Sequence[Task], results: list[Result]) -> Sequence[Result]:
     return results
+
+
+class Job(NamedTuple):
+    """What a worker is told of `Work`; it is pickled.
+
+    Attributes
+    ----------
+    do, join : callable
+        See `Work`.
+    longest_s : float
+        No further task of a chunk begins so many seconds after the first.
+    threads : int
+        See `Workers`.
+    """
+
+    do: Callable[[Any], Any]
+    join: Callable[[Any, list[Any]], Sized]
+    longest_s: float
+    threads: int
 
 
 @dataclass(frozen=True)
@@ -95,10 +114,10 @@ class Work(Generic[Task, Result]):
     unit: int = 1
     prepare: Callable[[Task], Task] | None = None
 
-    @property
-    def longest_s(self) -> float:
-        """The time after which a worker of this machine begins no further task of a chunk."""
-        return _LONGEST_S if self.unit == 1 else LONGEST_ON_CLUSTER_S
+    def job(self, threads: int, *, cluster: bool = False) -> Job:
+        """Return what workers of this machine, or of a cluster, are told."""
+        longest_s = _LONGEST_S if self.unit == 1 and not cluster else _LONGEST_OF_PARTS_S
+        return Job(self.do, self.join, longest_s, threads)
 
 
 @dataclass(frozen=True)
@@ -220,30 +239,19 @@ class Chunk(Generic[Task, Result]):
 
     Parameters
     ----------
-    do, join : callable
-        See `Work`.
+    job : Job
     tasks : sequence
     stopped : Event
         Once it is set, no further task begins.
-    longest_s : float
-        No further task begins so many seconds after the first.
     threads : ThreadPoolExecutor, optional
         The tasks wait for the network: they begin at once, in these threads, and one at a time computes.
         Otherwise each begins when the one before it is done, and the first when someone asks what was done.
     """
 
     def __init__(
-        self,
-        do: Callable[[Task], Result],
-        join: Callable[[Any, list[Result]], Sized],
-        tasks: Sequence[Task],
-        stopped: threading.Event,
-        longest_s: float,
-        threads: "ThreadPoolExecutor | None" = None,
+        self, job: Job, tasks: Sequence[Task], stopped: Event, threads: "ThreadPoolExecutor | None" = None
     ) -> None:
-        self._do, self._join, self._tasks = do, join, tasks
-        self._stopped, self._longest_s = stopped, longest_s
-        self._over = 0.0
+        self._job, self._tasks, self._stopped, self._over = job, tasks, stopped, 0.0
         self._errors: dict[int, Exception] = {}  # by the places of their tasks
         self._attempts: Iterable[tuple[Result, ...]] = map(self._attempt, range(len(tasks)))
         if threads is not None:
@@ -258,7 +266,7 @@ class Chunk(Generic[Task, Result]):
         seconds = time.monotonic() - start  # what else a chunk costs does not grow with its tasks
         error = self._errors.get(len(results))  # a later task may have failed before
         try:
-            return Done(self._join(self._tasks, results) if results else [], seconds, error)
+            return Done(self._job.join(self._tasks, results) if results else [], seconds, error)
         except Exception as failed:  # noqa: BLE001 (whoever asked for the results raises it)
             return Done([], seconds, _portable(failed))
 
@@ -269,11 +277,11 @@ class Chunk(Generic[Task, Result]):
     def _attempt(self, place: int) -> tuple[Result, ...]:
         """Do a task, and return its result; nothing where it fails, or the chunk has ended before it."""
         now = time.monotonic()
-        self._over = self._over or now + self._longest_s
+        self._over = self._over or now + self._job.longest_s
         if self._stopped.is_set() or min(self._errors, default=place) < place or now > self._over:
             return ()
         try:
-            return (self._do(self._tasks[place]),)
+            return (self._job.do(self._tasks[place]),)
         except Exception as error:  # noqa: BLE001 (whoever asked for the result raises it)
             self._errors[place] = _portable(error)
             return ()

@@ -23,7 +23,7 @@ from rollcli.files.atomic import is_file, is_there, write_atomic
 from rollcli.files.storage import remove
 from rollcli.files.stores.locations import is_url
 from rollcli.messages import one_line, say
-from rollcli.run.workers.chunks import LONGEST_ON_CLUSTER_S, Chunk, Done, Result, Task, Work, Workers
+from rollcli.run.workers.chunks import Chunk, Done, Result, Task, Work, Workers
 from rollcli.run.workers.pool import prepare_worker
 
 _CONNECT_S, _GREETING_S, _FIRST_WORKER_S = 6, 2, 5
@@ -129,9 +129,9 @@ class ClusterExecutor(Generic[Task, Result]):
         self.check_connection()
         chosen = set(self._threads_of) if self._refused else set()
         # bytes: the scheduler would make objects of all else, and pickle them again
-        told = pickle.dumps((self._work.do, self._work.join, chunk), pickle.HIGHEST_PROTOCOL)
+        told = pickle.dumps((self._work.job(self.threads, cluster=True), chunk), pickle.HIGHEST_PROTOCOL)
         sent = self._client.submit(
-            *(_do_chunk, __version__, self._run, told, self.threads),
+            *(_do_chunk, __version__, self._run, told),
             pure=False,
             priority=priority,
             workers=sorted(chosen) or None,
@@ -261,13 +261,13 @@ def _stop_run(run: str, threads: int) -> None:
     _run_here(run, threads)[0].set()
 
 
-def _do_chunk(version: str, run: str, told: bytes, threads: int) -> bytes:
+def _do_chunk(version: str, run: str, told: bytes) -> bytes:
     """Do a chunk on a worker, which begins another one while the last tasks wait for the network."""
     if version != __version__:
         raise WorkerError(_other_version(version))
-    stopped, pool = _run_here(run, threads)
-    do, join, tasks = pickle.loads(told)  # noqa: S301 (as Dask does)
-    chunk = Chunk(do, join, tasks, stopped, LONGEST_ON_CLUSTER_S, pool)
+    job, tasks = pickle.loads(told)  # noqa: S301 (as Dask does)
+    stopped, pool = _run_here(run, job.threads)
+    chunk: Chunk[Any, Any] = Chunk(job, tasks, stopped, pool)
     if pool is not None:
         from distributed import secede
 

@@ -9,7 +9,7 @@ import signal
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence, Sized
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from multiprocessing import connection
 from multiprocessing.connection import Connection
@@ -18,7 +18,7 @@ from typing import Any, Generic
 
 from rollcli.errors import WorkerDiedError, WorkerError
 from rollcli.extras import silence_matplotlib
-from rollcli.run.workers.chunks import Chunk, Done, Result, Task, Work, Workers
+from rollcli.run.workers.chunks import Chunk, Done, Job, Result, Task, Work, Workers
 from rollcli.run.workers.interrupt import ignore_signals, stop_signals
 
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
@@ -217,7 +217,7 @@ class Worker(Generic[Task, Result]):
         self.in_hand: deque[_Queued[Task, Result]] = deque()
         try:
             self.pipe, far_end = start.Pipe()
-            told = (far_end, self.pipe if fork else None, work.do, work.join, work.longest_s, threads)
+            told = (far_end, self.pipe if fork else None, work.job(threads))
             self._process = start.Process(target=_serve, args=told, daemon=True)
             with _stop_signals_blocked(fork):  # in the child, too: only the parent decides when work ends
                 self._process.start()
@@ -256,14 +256,7 @@ def _has_one_thread() -> bool:
         return False
 
 
-def _serve(
-    pipe: "Connection[Any, Any]",
-    near_end: "Connection[Any, Any] | None",
-    do: Callable[[Any], Any],
-    join: Callable[[Any, list[Any]], Sized],
-    longest_s: float,
-    threads: int,
-) -> None:
+def _serve(pipe: "Connection[Any, Any]", near_end: "Connection[Any, Any] | None", job: Job) -> None:
     """Do chunks, in a worker process, until it is stopped or the parent has died.
 
     A fork has the parent's end of its pipe, too, which would hide that the parent has died. It also has those
@@ -274,10 +267,10 @@ def _serve(
         near_end.close()
     start_error = _error_of(prepare_worker)
     pool = None
-    if threads > 1:
+    if job.threads > 1:
         from concurrent.futures import ThreadPoolExecutor  # only where tasks wait for the network
 
-        pool = ThreadPoolExecutor(threads)
+        pool = ThreadPoolExecutor(job.threads)
     chunks: queue.SimpleQueue[Chunk[Any, Any] | None] = queue.SimpleQueue()
     stopped = threading.Event()
 
@@ -287,7 +280,7 @@ def _serve(
                 tasks = pipe.recv()
                 if tasks is _STOP:
                     stopped.set()
-                chunks.put(None if tasks is _STOP else Chunk(do, join, tasks, stopped, longest_s, pool))
+                chunks.put(None if tasks is _STOP else Chunk(job, tasks, stopped, pool))
         finally:  # the parent has died: a killed run must leave no workers that go on writing
             os._exit(1)
 

@@ -177,8 +177,12 @@ def test_this_process_begins_no_task_after_a_stop():
     assert begun == ["a"]
 
 
+def job_of(do):
+    return WORK.job(1)._replace(do=do)
+
+
 def chunk_of(do, tasks, stopped=None):
-    return Chunk(do, WORK.join, tasks, stopped or threading.Event(), WORK.longest_s)
+    return Chunk(job_of(do), tasks, stopped or threading.Event())
 
 
 def test_a_chunk_ends_between_tasks_when_it_is_stopped():
@@ -225,7 +229,7 @@ def test_what_overtook_a_failed_task_is_no_result_of_its_chunk():
         return task
 
     with ThreadPoolExecutor(3) as threads:
-        done = Chunk(fail, WORK.join, range(3), threading.Event(), WORK.longest_s, threads).done()
+        done = Chunk(job_of(fail), range(3), threading.Event(), threads).done()
     assert (done.results, type(done.error)) == ([0], RuntimeError)
 
 
@@ -251,7 +255,7 @@ def test_of_several_failures_the_first_tasks_is_raised_whatever_the_order_of_the
             raise InputError(task)
         return task
 
-    done = Chunk(fail, WORK.join, "abcd", threading.Event(), WORK.longest_s, InOrder(order)).done()
+    done = Chunk(job_of(fail), "abcd", threading.Event(), InOrder(order)).done()
     assert (done.results, str(done.error)) == (["a"], "b")
 
 
@@ -262,5 +266,5 @@ def test_a_failure_is_not_raised_before_the_tasks_in_front_of_it_are_done():
         stopped.set()
         raise InputError(task)
 
-    done = Chunk(stop_and_fail, WORK.join, "ab", stopped, WORK.longest_s, InOrder((1, 0))).done()
+    done = Chunk(job_of(stop_and_fail), "ab", stopped, InOrder((1, 0))).done()
     assert (done.results, done.error) == ([], None)
