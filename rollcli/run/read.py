@@ -243,34 +243,20 @@ def _read(frame: Frame, options: FrameOptions) -> Source:
     found = to_disparity(stored, **given._asdict(), calibration=frame.calibration)
     encoding = found.encoding.value
     beyond = {"beyond": too_large(found.disparity, stored, encoding)}
-    error, doubt, alignment, levelled, size = _carried(stored)
+    source = Source(found.disparity, stored=stored, encoding=encoding, warnings={**found.warnings, **beyond})
+    source = replace(source, **_carried(stored))
     # the roll is the same at any scale, pitch and height are not
-    doubts = {"carried": doubt, **(beyond if frame.calibration is not None else {})}
-    return Source(
-        found.disparity,
-        stored=stored,
-        encoding=encoding,
-        warnings={**found.warnings, **beyond},
-        slope_error=error,
-        doubts=doubts,
-        alignment=alignment,
-        levelled=levelled,
-        size=size,
-    )
+    return source if frame.calibration is None else replace(source, doubts={**source.doubts, **beyond})
 
 
 def size_of_images(stored: Stored) -> tuple[int, int]:
     """Return the width and height of the images that a map was matched from, as far as its file says, px."""
     height, width = stored.values.shape
-    return _carried(stored)[4] or (width, height)
+    return _carried(stored).get("size") or (width, height)
 
 
-_Carried = tuple[float, str, Mapping[str, float], tuple[float, float], tuple[int, int] | None]
-_NOTHING: _Carried = 0.0, "", {}, (0.0, 0.0), None
-
-
-def _carried(stored: Stored) -> _Carried:
-    """Read how a map was made: slope error, doubt, alignment, levelling and size of its `Source`.
+def _carried(stored: Stored) -> dict[str, Any]:
+    """Read how a map was made: slope error, doubts, alignment, levelling and size of a `Source`.
 
     Nothing is known where another program has written or changed its file, or where no rig has such numbers.
     """
@@ -278,19 +264,24 @@ def _carried(stored: Stored) -> _Carried:
         carried = json.loads(stored.text)
         error, doubt, lay = float(carried["slope_error"]), carried["doubt"], carried["alignment"]
         alignment = {name: float(lay[name]) for name in ALIGNMENT_COLUMNS if name in lay}
-        larger, clockwise = map(float, carried.get("levelled", _NOTHING[3]))  # earlier files have none
+        larger, clockwise = map(float, carried.get("levelled", (0.0, 0.0)))  # earlier files have none
         width, height = map(int, carried.get("size", reversed(stored.values.shape)))
         # else the map was turned with --expand: its sides are not those of the images, but for one factor
         same_view = min(width, height) > 0 and one_factor(stored.values.shape[::-1], (width, height))
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
-        return _NOTHING
+        return {}
     most = dict(zip(ALIGNMENT_COLUMNS, LARGEST, strict=False))
     levelled = ("right_larger_percent", 100 * larger), ("right_clockwise_deg", math.degrees(clockwise))
     fits = all(abs(value) <= most[name] for name, value in (*alignment.items(), *levelled))
     if not (0 <= error < math.inf and isinstance(doubt, str) and fits):
-        return _NOTHING
-    size = (width, height) if same_view else None
-    return error, printable(one_line(doubt)), alignment, (larger, clockwise), size
+        return {}
+    return {
+        "slope_error": error,
+        "doubts": {"carried": printable(one_line(doubt))},
+        "alignment": alignment,
+        "levelled": (larger, clockwise),
+        "size": (width, height) if same_view else None,
+    }
 
 
 def _match(frame: Frame, options: FrameOptions) -> Source:

@@ -10,7 +10,7 @@ import rollcli as package
 from rollcli.files.codecs.raw_map import Stored
 from rollcli.files.results import ALIGNMENT_COLUMNS
 from rollcli.rig.calibration import Calibration
-from rollcli.run.read import _NOTHING, Source, _carried
+from rollcli.run.read import Source, _carried
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
@@ -173,23 +173,23 @@ def carried(text, shape=(30, 40)):
 def test_what_a_file_carries_is_read_back_and_what_others_wrote_is_not():
     known = {"slope_error": 0.00125, "doubts": {"match": 'a "doubt"'}, "alignment": {"right_lower_px": 1.25}}
     text = Source(np.zeros((30, 40)), **known, levelled=(1e-3, -2e-3), size=(80, 61)).text
-    said = 0.00125, 'a "doubt"', {"right_lower_px": 1.25}
-    assert carried(text) == (*said, (1e-3, -2e-3), (80, 61))
-    assert carried(text, (36, 48))[4] == (80, 61)
-    assert carried(text, (30, 48))[4] is None  # turned with room for its corners
+    said = {**known, "doubts": {"carried": 'a "doubt"'}}
+    assert carried(text) == {**said, "levelled": (1e-3, -2e-3), "size": (80, 61)}
+    assert carried(text, (36, 48))["size"] == (80, 61)
+    assert carried(text, (30, 48))["size"] is None  # turned with room for its corners
     of_before = text.replace(', "levelled": [0.001, -0.002], "size": [80, 61]', "")
-    assert carried(of_before) == (*said, (0.0, 0.0), (40, 30))
+    assert carried(of_before) == {**said, "levelled": (0.0, 0.0), "size": (40, 30)}
     assert Source(np.zeros((30, 40)), size=(40, 30)).text == ""
     assert text.isascii()
     lies = '{"slope_error": 0, "doubt": "", "alignment": {"right_lower_px": NaN, "right_twist_px": 1}}'
     for other in ("", "{}", "[1]", "null", '{"slope_error": -1, "doubt": "", "alignment": {}}', "no", lies):
-        assert carried(other) == (0.0, "", {}, (0.0, 0.0), None)
+        assert carried(other) == {}
 
 
 def test_what_a_file_carries_cannot_break_a_result():
     """No rig has such numbers, and readers of rows refuse them; a text holds nothing that UTF-8 cannot."""
     whole = {"slope_error": 0.001, "doubt": "", "alignment": {"right_lower_px": 1.25}, "levelled": [0, 0]}
-    assert carried(json.dumps(whole)) != _NOTHING
+    assert carried(json.dumps(whole)) != {}
     for damaged in (
         {"alignment": {"right_lower_px": 1e300}},
         {"levelled": [1e30, 0]},
@@ -197,6 +197,7 @@ def test_what_a_file_carries_cannot_break_a_result():
         {"size": 2},
         {"size": [10**400, 1]},
     ):
-        assert carried(json.dumps(whole | damaged)) == _NOTHING
-    assert carried(json.dumps(whole | {"size": [-40, -30]}))[4] is None
-    assert carried(json.dumps(whole | {"doubt": "\ud800\x1b \n!"}))[1] == r"\ud800\x1b !"
+        assert carried(json.dumps(whole | damaged)) == {}
+    assert carried(json.dumps(whole | {"size": [-40, -30]}))["size"] is None
+    doubtful = carried(json.dumps(whole | {"doubt": "\ud800\x1b \n!"}))
+    assert doubtful["doubts"] == {"carried": r"\ud800\x1b !"}
