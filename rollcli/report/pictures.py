@@ -91,7 +91,7 @@ def _attempt(make: Callable[[], Made]) -> tuple[Made | None, str]:
 def _source(subject: Subject) -> Source:
     frame, options = subject.frame, subject.options
     if "disparity" in subject.images:
-        of_map = replace(frame, path=subject.images["disparity"], right_path="", right_file="", mask=None)
+        of_map = frame._replace(path=subject.images["disparity"], right_path="", right_file="", mask=None)
         source = read_source(of_map, FrameOptions())
         height, width = source.disparity.shape
         downscale = options.stereo.downscale if frame.right_file else 1.0

@@ -3,7 +3,7 @@
 import bisect
 import math
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from rollcli.errors import UsageError
@@ -132,7 +132,7 @@ def subjects(
             f"{images}: has no image of {listed(without)}: name the folder where estimate has put what it "
             "wrote, or leave --images out to have the pictures made from the inputs"
         )
-    frames = [replace(frame_of_row(row, result), calibration=calibration) for row in rows]
+    frames = [frame_of_row(row, result)._replace(calibration=calibration) for row in rows]
     return [
         Subject(frame, files, row, options, _refusal(row, result, there, fetch))
         for frame, files, row in zip(frames, found, rows, strict=True)

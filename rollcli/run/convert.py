@@ -6,7 +6,6 @@ Where they are given a result, each map has its row there.
 import math
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import replace
 
 from rollcli.errors import ExitStatus, RollcliError, UsageError
 from rollcli.extras import require_extra
@@ -70,7 +69,7 @@ def _plan(options: ConvertOptions) -> list[Frame]:
     rows = _find_rows(frames, options)
     check_first_size(frames, options)
     wanted = [
-        replace(frame, row=row)
+        frame._replace(row=row)
         for frame, row in zip(frames, rows, strict=True)
         if row is None or row.status != "suspect" or not options.skip_suspect
     ]
@@ -150,7 +149,7 @@ def _rows_of(frames: Sequence[Frame], result: str, options: ConvertOptions) -> l
         mask_of = _masks_of(recorded, result)
         for at in {round(i * (len(elsewhere) - 1) / (_COMPARED - 1)): None for i in range(_COMPARED)}:
             frame, row = elsewhere[at]
-            if not _is_copy(replace(frame, mask=mask_of(row.file)), row, recorded):
+            if not _is_copy(frame._replace(mask=mask_of(row.file)), row, recorded):
                 differ = f"its row is of {row.file}, and not of {frame.file}"
                 raise UsageError(f"{result}: {differ}: give the result of these maps")
     _tell_suspects(matched, options)

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-@dataclass(frozen=True, slots=True)
-class Frame:
+class Frame(NamedTuple):
     """A map or a stereo pair, as a worker is told of it.
 
     Attributes
@@ -48,7 +47,7 @@ class Frame:
     mask: str | None
     calibration: Calibration | None = None
     row: Row | None = None
-    decoded: "Decoded | None" = field(default=None, compare=False)
+    decoded: "Decoded | None" = None
 
     def reads(self) -> Iterator[str]:
         """Yield every file that this frame needs."""
@@ -62,10 +61,6 @@ class Frame:
     def of_videos(self) -> bool:
         """Whether its views are frames of videos, which are decoded in order."""
         return all(is_video(file_of(path)) for path in (self.path, self.right_path))
-
-    def __reduce__(self) -> tuple[type["Frame"], tuple[object, ...]]:
-        """Pickle the values alone: what a dataclass with slots does takes five times as long."""
-        return Frame, tuple(getattr(self, name) for name in self.__slots__)
 
 
 def frame_of_row(row: Row, result: str) -> Frame:

@@ -313,7 +313,7 @@ def decoded(frame: Frame, options: FrameOptions) -> Frame:
     """
     if frame.of_videos:
         with contextlib.suppress(*FRAME_ERRORS), noting(options.notes) as notes:
-            return replace(frame, decoded=Decoded(read_views(frame, options), notes))
+            return frame._replace(decoded=Decoded(read_views(frame, options), notes))
     return frame
 
 
