@@ -43,8 +43,8 @@ def run_conversion(options: ConvertOptions) -> ExitStatus:
     """
     running = options.running
     frames = _plan(options)
-    if running.dry_run:
-        outputs.list_files((each.reads(), outputs.every_path(each, options.writes)) for each in frames)
+    files = ((each.reads(), outputs.every_path(each, options.writes)) for each in frames)
+    if outputs.listed_only(files, running):
         return ExitStatus.DONE
     require_scheduler(running.scheduler)
     progress = Progress(len(frames), running, options.encoding, statuses=("ok",))
@@ -61,7 +61,7 @@ def run_conversion(options: ConvertOptions) -> ExitStatus:
 
 
 def _plan(options: ConvertOptions) -> list[Frame]:
-    """Find the frames, give each its row, and check what would be read and written."""
+    """Find the frames, give each its row, and check what can be checked before they run."""
     _check_options(options)
     frames = find_frames(options)
     if not (options.paired or isinstance(options, DerotateOptions)):
@@ -75,11 +75,6 @@ def _plan(options: ConvertOptions) -> list[Frame]:
     ]
     outputs.check_one_owner(wanted, options.writes)
     outputs.check_places(wanted, options.folders)
-    outputs.check_writes(
-        [path for each in wanted for path in each.reads()],
-        list(outputs.files_of(wanted, options.writes)),
-        overwrite=options.running.overwrite,
-    )
     return wanted
 
 

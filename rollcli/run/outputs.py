@@ -2,12 +2,11 @@
 
 import contextlib
 import hashlib
-import itertools
 import os
 import posixpath
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
-from itertools import islice
+from itertools import chain, filterfalse, islice
 from pathlib import Path
 from unicodedata import normalize
 
@@ -40,7 +39,7 @@ def roomy_path(path: str) -> str:
 def local_files(frames: Iterable[Frame], status: bytes, writes: Sequence[Written]) -> Iterator[str]:
     """Yield the files of those frames that have angles which a power cut may take from a local disk."""
     angled = (frame for frame, at in zip(frames, status, strict=True) if STATUSES[at] != "error")
-    return itertools.filterfalse(is_url, files_of(angled, writes))
+    return filterfalse(is_url, files_of(angled, writes))
 
 
 def every_path(frame: Frame, writes: Iterable[Written]) -> list[str]:
@@ -192,24 +191,32 @@ def check_named_once(names: Sequence[str]) -> None:
         raise UsageError(f"{twice[0]}: is named twice")
 
 
-def check_writes(reads: Sequence[str], writes: Sequence[str], *, overwrite: bool) -> None:
-    """Check that no input is written and, unless `overwrite`, that no output exists.
+def listed_only(files: Iterable[tuple[Iterable[str], Iterable[str]]], running: RunningOptions) -> bool:
+    """Check what would be read and written, and list it where that is all that was asked.
+
+    Parameters
+    ----------
+    files : iterable of (reads, writes)
+        What is read and written, in parts.
+    running : RunningOptions
+
+    Returns
+    -------
+    bool
+        Whether that was all.
 
     Raises
     ------
     UsageError
-        Names the file.
+        Names an input that would be written, or without --overwrite an output that exists.
     """
-    check_inputs_are_kept(lambda: reads, writes)
-    if not overwrite:
-        check_nothing_is_there(writes)
-
-
-def listed_only(reads: Sequence[str], writes: Sequence[str], running: RunningOptions) -> bool:
-    """Check what would be read and written (see `check_writes`); list it where that is all that was asked."""
-    check_writes(reads, writes, overwrite=running.overwrite)
+    every = [(list(reads), list(writes)) for reads, writes in files]
+    written = [path for _, writes in every for path in writes]
+    check_inputs_are_kept(lambda: chain.from_iterable(reads for reads, _ in every), written)
+    if not running.overwrite:
+        check_nothing_is_there(written)
     if running.dry_run:
-        list_files([(reads, writes)])
+        list_files(every)
     return running.dry_run
 
 

@@ -50,14 +50,14 @@ def inputs(maps):
 
 @pytest.mark.parametrize("line", LATE)
 def test_the_later_of_two_does_not_replace_what_the_first_wrote(inputs, monkeypatch, line):
-    check, written = outputs.check_writes, inputs / LATE[line]
+    check, written = outputs.check_nothing_is_there, inputs / LATE[line]
 
     def checked_then_written_by_another(*arguments, **settings):
         check(*arguments, **settings)
         written.parent.mkdir(exist_ok=True)
         written.write_bytes(b"another's")
 
-    monkeypatch.setattr(outputs, "check_writes", checked_then_written_by_another)
+    monkeypatch.setattr(outputs, "check_nothing_is_there", checked_then_written_by_another)
     done = rollcli(*line.split(), cwd=inputs, status=2)
     assert f"{LATE[line]}: exists already; give --overwrite to replace it" in done.err
     assert written.read_bytes() == b"another's"
