@@ -64,8 +64,8 @@ def _plan(options: ConvertOptions) -> list[Frame]:
     """Find the frames, give each its row, and check what can be checked before they run."""
     _check_options(options)
     frames = find_frames(options)
-    if not (options.paired or isinstance(options, DerotateOptions)):
-        check_depth(frames, options.encoding)
+    if not isinstance(options, DerotateOptions):
+        check_depth(frames, options)
     rows = _find_rows(frames, options)
     check_first_size(frames, options)
     wanted = [

@@ -31,7 +31,7 @@ from rollcli.messages import say
 from rollcli.rig.calibration import Calibration, CalibrationOptions, require_calibration
 from rollcli.rig.read_calibration import MAX_BYTES, parse_calibration, with_numbers
 from rollcli.run.frame import Frame
-from rollcli.run.options import EncodingOptions, FramesOptions, InputOptions, Layout
+from rollcli.run.options import FramesOptions, InputOptions, Layout
 
 _TRIED = 8  # frames, until one can be read
 _MARK = "_camera"  # Cityscapes: aachen_000000_000019_camera.json
@@ -208,7 +208,7 @@ def check_first_size(frames: Sequence[Frame], options: FramesOptions) -> Calibra
     return fitting.for_size(*reversed(matched))
 
 
-def check_depth(frames: Sequence[Frame], encoding: EncodingOptions) -> None:
+def check_depth(frames: Sequence[Frame], options: FramesOptions) -> None:
     """Refuse depth maps without the calibration that turns their numbers into disparities.
 
     Raises
@@ -217,7 +217,7 @@ def check_depth(frames: Sequence[Frame], encoding: EncodingOptions) -> None:
     """
     used = (frame.calibration for frame in frames if not _is_broken(frame.file))
     lacking = (calibration is None or calibration.baseline is None for calibration in used)
-    if encoding.encoding == "depth" and any(lacking):
+    if options.encoding.encoding == "depth" and not options.paired and any(lacking):
         raise UsageError(
             "--encoding depth needs a focal length and a baseline, which turn a depth into a disparity: "
             "give --calib, or --focal, --principal-point and --baseline"

@@ -53,8 +53,7 @@ def make_plan(options: EstimateOptions) -> Plan:
     """
     _check_start(options)
     frames = find_frames(options)
-    if not options.paired:
-        check_depth(frames, options.encoding)
+    check_depth(frames, options)
     plan = Plan(options, frames)
     if options.result.update and options.result.in_parts:
         raise UsageError(
