@@ -620,18 +620,10 @@ class DisparityOptions(ConvertOptions):
         return True
 
     @property
-    def frame(self) -> FrameOptions:
-        """How a pair is matched: levelled as the estimate does, then every row."""
-        return super().frame._replace(images=self._images)
-
-    @property
-    def _images(self) -> ImageOptions:
-        return ImageOptions(disparity=self.output, save_as=self.save_as)
-
-    @property
     def writes(self) -> tuple[Written, ...]:
         """The map, and its picture."""
-        return *self._images.writes(computed=True), *_picture(self.preview)
+        maps = ImageOptions(disparity=self.output, save_as=self.save_as).writes(computed=True)
+        return *maps, *_picture(self.preview)
 
 
 @dataclass(frozen=True)
