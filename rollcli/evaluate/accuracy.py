@@ -365,11 +365,10 @@ def _heights(read: Result, known: Mapping[str, KnownPose], options: AccuracyOpti
     except InputError as error:
         if options.heights is not None:
             raise
-        if not options.running.quiet:  # nobody has asked for them
-            say(f"no heights are compared: {error}")
+        options.running.note(f"no heights are compared: {error}")  # nobody has asked for them
         return {}
-    if found is None and not options.running.quiet:
-        say(
+    if found is None:
+        options.running.note(
             f"{heights}: no heights are compared: they need metres (estimate --calib), and the truth columns "
             "focal_px and baseline_m"
         )

@@ -9,7 +9,7 @@ from rollcli.extras import require_extra
 from rollcli.files.naming import listed, natural_key
 from rollcli.files.results import Result, Row, read_result, run_path
 from rollcli.files.storage import is_stream, write_output
-from rollcli.messages import counted, say
+from rollcli.messages import counted
 from rollcli.report.charts import all_charts
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import Chart
@@ -79,8 +79,8 @@ def run_report(options: ReportOptions) -> ExitStatus:
     writes = [*(path for name in charts for path in options.chart_paths(name).values()), *page]
     if listed_only([([*options.results, *reads], writes)], options.running):
         return ExitStatus.DONE
-    if (missing := unfinished(parts)) and not options.running.quiet:
-        say(missing)
+    if missing := unfinished(parts):
+        options.running.note(missing)
     return _write(options, result, chosen, found, rig, charts)
 
 

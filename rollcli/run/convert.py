@@ -12,7 +12,6 @@ from rollcli.extras import require_extra
 from rollcli.files.inputs import is_elsewhere, match_paths
 from rollcli.files.naming import listed
 from rollcli.files.results import Row, read_result, run_path
-from rollcli.messages import say
 from rollcli.run import outputs
 from rollcli.run.batch import work_on, workers_for
 from rollcli.run.find import check_depth, check_first_size, find_frames, mask_finder
@@ -100,9 +99,8 @@ def _find_rows(frames: Sequence[Frame], options: ConvertOptions) -> Sequence[Row
         return [None] * len(frames)
     rows = _rows_of(frames, options.result, options)
     posed = (frame for frame, row in zip(frames, rows, strict=True) if row.pitch_deg is not None)
-    lacking = isinstance(options, HeightsOptions) and any(frame.calibration is None for frame in posed)
-    if lacking and not options.running.quiet:
-        say(
+    if isinstance(options, HeightsOptions) and any(frame.calibration is None for frame in posed):
+        options.running.note(
             f"{options.result}: was made with a calibration: give it with --calib; without it heights are in "
             "camera heights, and off where the road has camber and the principal point is not in the middle"
         )
@@ -181,9 +179,7 @@ def _tell_suspects(rows: Sequence[Row], options: ConvertOptions) -> None:
     suspects, skips = sum(row.status == "suspect" for row in rows), options.skip_suspect
     if skips and suspects == len(rows):
         raise UsageError(f"{options.result}: every angle is suspect: --skip-suspect leaves out all maps")
-    if not suspects or options.running.quiet:
-        return
-    done = "; such maps are left out" if skips else " and used; --skip-suspect leaves such maps out"
-    say(
-        f"{options.result}: {suspects} of {len(rows)} angles {'is' if suspects == 1 else 'are'} suspect{done}"
-    )
+    if suspects:
+        are = "is" if suspects == 1 else "are"
+        done = "; such maps are left out" if skips else " and used; --skip-suspect leaves such maps out"
+        options.running.note(f"{options.result}: {suspects} of {len(rows)} angles {are} suspect{done}")

@@ -4,8 +4,8 @@ import contextlib
 import glob
 import itertools
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cache, cached_property
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
 from pathlib import Path, PurePosixPath
 from typing import overload
 
@@ -27,7 +27,6 @@ from rollcli.files.naming import Input, gathered, natural_key
 from rollcli.files.search import IMAGE_ENDINGS, LEAVE_NONE, MAP_ENDINGS, Search, is_place, objects_behind
 from rollcli.files.storage import fetch_all, read_bytes
 from rollcli.files.stores.locations import is_url, names_a_file, public_name
-from rollcli.messages import say
 from rollcli.rig.calibration import Calibration, CalibrationOptions, require_calibration
 from rollcli.rig.read_calibration import MAX_BYTES, parse_calibration, with_numbers
 from rollcli.run.frame import Frame
@@ -204,7 +203,7 @@ def check_first_size(frames: Sequence[Frame], options: FramesOptions) -> Calibra
         return None
     fitting = first.calibration.for_size(width, height)
     if doubt := first.calibration.seems_of_another_size(width, height):
-        _tell([doubt], options)
+        options.running.note(doubt)
     return fitting.for_size(*reversed(matched))
 
 
@@ -241,6 +240,10 @@ def _read(
     return parse_calibration(files, given)
 
 
+# a frame's left view or map, its right view, and the calibration of its bag
+_Named = tuple[Input, Input | None, Calibration | None]
+
+
 def find_frames(options: FramesOptions) -> Sequence[Frame]:
     """Make a frame of each map, or of each stereo pair, that a user named.
 
@@ -250,33 +253,34 @@ def find_frames(options: FramesOptions) -> Sequence[Frame]:
         Nothing is named or found, pairs are named in several ways, an image has no partner, a mask or a
         calibration is missing, or names are not sorted that should be.
     """
-    if not options.paired:
-        return _map_frames(options)
-    if options.inputs.sorted:
-        raise UsageError("--sorted takes a list of maps, not of pairs")
-    return _pair_frames(options)
-
-
-def _map_frames(options: FramesOptions) -> Sequence[Frame]:
     given = options.inputs
     if given.sorted:
         return _sorted_frames(options)
+    make, numbers = _frame_maker(options), itertools.count()
+    named = _pairs(options) if options.paired else _maps(options)
+    # what is broken is always taken
+    return [make(*each) for each in named if is_rest(each[0].location) or next(numbers) % given.every == 0]
+
+
+def _maps(options: FramesOptions) -> Iterator[_Named]:
+    """Find the maps: files, or those of a bag."""
+    given = options.inputs
     if not (given.inputs or given.files_from):
         raise UsageError("no input: name maps (files, folders, patterns, or - for a list on stdin)")
-    make = _FrameMaker(options)
     if bags := _bags(given):
-        return _bag_frames(bags, make, options)
+        yield from _in_bags(bags, options)
+        return
     if given.topic is not None:
         raise UsageError("--topic is of a bag (.bag, .db3, .mcap or a rosbag2 folder), and none is given")
     search = _search(options, MAP_ENDINGS, maps=True)
     found = find_inputs(given.inputs, search, files_from=given.files_from)
-    _tell(search.notes, options)
+    options.running.note(*search.notes)
     if video := next((each.name for each in found if is_video(each.location)), None):
         raise UsageError(
             f"{video}: is a video, of views and not of maps: give --side-by-side (estimate, disparity) "
             "where its frames hold both, or --left and --right with a video each"
         )
-    return [make.frame(each) for each in found[:: given.every]]
+    yield from ((each, None, None) for each in found)
 
 
 def _search(options: FramesOptions, endings: tuple[str, ...], *, maps: bool = False) -> Search:
@@ -284,27 +288,23 @@ def _search(options: FramesOptions, endings: tuple[str, ...], *, maps: bool = Fa
     return Search(endings, given.recursive, given.include, given.exclude, options.folders, maps)
 
 
-def _tell(notes: Iterable[str], options: FramesOptions) -> None:
-    """Say what a search has noted, each once."""
-    if not options.running.quiet:
-        say(*dict.fromkeys(notes))
-
-
 def _sorted_frames(options: FramesOptions) -> "SortedFrames":
     given = options.inputs
+    if options.paired:
+        raise UsageError("--sorted takes a list of maps, not of pairs")
     if given.inputs or given.files_from is None or given.files_from == "-" or is_url(given.files_from):
         raise UsageError("--sorted takes the names of one file on disk: give --files-from FILE and no input")
     if given.recursive or given.include or given.exclude:
         raise UsageError("--sorted takes the names as they are: leave out --recursive, --include, --exclude")
     manifest = Manifest(given.files_from)
     places = range(0, len(manifest), given.every)
-    return SortedFrames(manifest, _FrameMaker(options), places)
+    return SortedFrames(manifest, _frame_maker(options), places)
 
 
 class SortedFrames(Sequence[Frame]):
     """The frames of a manifest, made when they are asked for; a slice of them is another such sequence."""
 
-    def __init__(self, manifest: Manifest, make: "_FrameMaker", places: range) -> None:
+    def __init__(self, manifest: Manifest, make: Callable[..., Frame], places: range) -> None:
         self._manifest, self._make, self._places = manifest, make, places
 
     def __len__(self) -> int:
@@ -312,7 +312,7 @@ class SortedFrames(Sequence[Frame]):
 
     def __iter__(self) -> Iterator[Frame]:
         for name in self._manifest.names(self._places):
-            yield self._make.frame(named_input(name))
+            yield self._make(named_input(name))
 
     @overload
     def __getitem__(self, index: int) -> Frame: ...
@@ -326,8 +326,8 @@ class SortedFrames(Sequence[Frame]):
         return SortedFrames(self._manifest, self._make, self._places[index])
 
 
-def _pair_frames(options: FramesOptions) -> list[Frame]:
-    """Make a frame of each pair: of two places, of topics of bags, or of images that hold both views."""
+def _pairs(options: FramesOptions) -> Iterator[_Named]:
+    """Find the pairs: of two places, of topics of bags, or of images that hold both views."""
     given, pairs, topics = options.inputs, options.pairs, options.topics
     has_inputs = bool(given.inputs or given.files_from)
     sides, views = (pairs.left, pairs.right), (topics.left_topic, topics.right_topic)
@@ -337,15 +337,15 @@ def _pair_frames(options: FramesOptions) -> list[Frame]:
             "name pairs in one way: --left and --right alone; or INPUTS, with --left-topic and --right-topic "
             "for bags, or --side-by-side for images and videos that hold both views"
         )
-    make = _FrameMaker(options)
     if any(views):
         if not all(views):
             raise UsageError("--left-topic and --right-topic are given together")
-        if bags := _bags(given):
-            return _bag_frames(bags, make, options)
-        raise UsageError(
-            "--left-topic and --right-topic are of a bag: name a .bag, .db3, .mcap or rosbag2 folder"
-        )
+        if not (bags := _bags(given)):
+            raise UsageError(
+                "--left-topic and --right-topic are of a bag: name a .bag, .db3, .mcap or rosbag2 folder"
+            )
+        yield from _in_bags(bags, options)
+        return
     videos = VIDEOS if pairs.side_by_side is not None else ()
     search = _search(options, (*IMAGE_ENDINGS, *videos))
     if pairs.side_by_side is not None:
@@ -356,15 +356,8 @@ def _pair_frames(options: FramesOptions) -> list[Frame]:
     else:
         matched = pair_inputs(pairs.left, pairs.right, search, match=pairs.match)
     both = [views for pair in matched for views in _frames_of(*pair, pairs.side_by_side)]
-    _tell(search.notes, options)
-    taken = _each_of(given.every)
-    return [make.frame(left, right) for left, right in both if taken(left)]
-
-
-def _each_of(every: int) -> Callable[[Input], bool]:
-    """Return what tells, of one frame after the other, whether it is taken; what is broken always is."""
-    numbers = itertools.count()
-    return lambda frame: is_rest(frame.location) or next(numbers) % every == 0
+    options.running.note(*search.notes)
+    yield from ((left, right, None) for left, right in both)
 
 
 def _frames_of(left: Input, right: Input, layout: Layout | None) -> list[tuple[Input, Input]]:
@@ -407,7 +400,7 @@ def _behind(name: str) -> list[str]:
     return sorted(found, key=natural_key) or [name]
 
 
-def _bag_frames(bags: _Bags, make: "_FrameMaker", options: FramesOptions) -> list[Frame]:
+def _in_bags(bags: _Bags, options: FramesOptions) -> Iterator[_Named]:
     from rollcli.files.recordings.frames import maps_of_bag, pairs_of_bag
 
     left, right, milliseconds = options.topics
@@ -416,29 +409,19 @@ def _bag_frames(bags: _Bags, make: "_FrameMaker", options: FramesOptions) -> lis
         found = [pairs_of_bag(files, name, left, right, tolerance) for name, files in bags]
     else:
         found = [maps_of_bag(files, name, options.inputs.topic) for name, files in bags]
-    frames: list[Frame] = []
-    taken = _each_of(options.inputs.every)
     for bag in found:
         known, given = bag.calibration, options.calibration
-        _tell([*bag.notes, *([] if given.given else bag.uncalibrated)], options)
+        options.running.note(*bag.notes, *([] if given.given else bag.uncalibrated))
         known = None if known is None or given.calib else with_numbers(known, given)
-        frames += [make.frame(left, right, known) for left, right in bag.frames if taken(left)]
-    return frames
+        yield from ((*views, known) for views in bag.frames)
 
 
-class _FrameMaker:
-    """Makes frames, with the masks and calibrations that were named: one for all, or one of each stem."""
+def _frame_maker(options: FramesOptions) -> Callable[..., Frame]:
+    """Return what makes frames, with the masks and calibrations that were named: one, or one of each stem."""
+    mask_of = mask_finder(options.region.mask)
+    calibration_of = cache(lambda: calibration_finder(options.calibration))  # not where bags have their own
 
-    def __init__(self, options: FramesOptions) -> None:
-        self._given = options.calibration
-        self._mask = mask_finder(options.region.mask)
-
-    @cached_property
-    def _calibration(self) -> Callable[[str], Calibration | None]:
-        return calibration_finder(self._given)
-
-    def frame(self, left: Input, right: Input | None = None, calibration: Calibration | None = None) -> Frame:
-        """Make the frame of a map, or of the views of a pair; `calibration` is that of its bag, if any."""
+    def frame(left: Input, right: Input | None = None, calibration: Calibration | None = None) -> Frame:
         # what is made of an input must stay in its folder, whatever a store or an archive calls it
         foreign = is_url(left.location) or file_of(left.location) != left.location
         return Frame(
@@ -447,6 +430,8 @@ class _FrameMaker:
             path=left.location,
             right_path=right.location if right else "",
             relative=left.relative if not foreign or names_a_file(left.relative) else "",
-            mask=self._mask(left.name),
-            calibration=calibration or self._calibration(left.name),
+            mask=mask_of(left.name),
+            calibration=calibration or calibration_of()(left.name),
         )
+
+    return frame

@@ -17,6 +17,7 @@ from rollcli.estimator.request import (
     LearningRate,
     Request,
 )
+from rollcli.messages import say
 from rollcli.rig.calibration import Calibration, CalibrationOptions
 from rollcli.stereo.options import StereoOptions
 
@@ -322,6 +323,11 @@ class RunningOptions(NamedTuple):
     def root(self) -> str:
         """The folder where relative paths start, for workers on other machines; empty for this one."""
         return str(Path.cwd()) if self.scheduler is not None else ""
+
+    def note(self, *messages: str) -> None:
+        """Write a line for each message to standard error, each once, unless quiet."""
+        if not self.quiet:
+            say(*dict.fromkeys(messages))
 
 
 class FrameOptions(NamedTuple):

@@ -162,13 +162,13 @@ class TaskProgress:
     ----------
     total : int
         Frames to do.
-    quiet, verbose : bool
-        Whether to write errors alone, or details too.
+    running : RunningOptions
+        How much to say.
     """
 
-    def __init__(self, total: int, *, quiet: bool = False, verbose: bool = False) -> None:
+    def __init__(self, total: int, running: RunningOptions) -> None:
         self.total, self.kept = total, 0
-        self._quiet, self._verbose = quiet, verbose
+        self._quiet, self._verbose = running.quiet, running.verbose
         self._finished = 0
         self._shown: set[str] = set()
         self._start = self._last_line = time.monotonic()
@@ -308,7 +308,6 @@ class Progress(TaskProgress):
     total : int
         Frames to do.
     running : RunningOptions
-        How much to say.
     encoding : EncodingOptions
         An encoding that was found rather than given is named once.
     statuses : sequence of str
@@ -325,7 +324,7 @@ class Progress(TaskProgress):
         statuses: Sequence[str] = ("ok", "suspect"),
         summary: RunSummary | None = None,
     ) -> None:
-        super().__init__(total, quiet=running.quiet, verbose=running.verbose)
+        super().__init__(total, running)
         self.summary = summary or RunSummary()
         self.kept = self.summary.frames
         self._statuses = statuses

@@ -253,14 +253,13 @@ def run_rig(options: RigOptions) -> int:
     if options.correction is not None:
         rows = None if health is None else rows_of_drive(rig, options.results)
         texts.append((options.correction, correction_text(health, rows, options.results)))
-        if rows is None and not options.running.quiet:
-            say(f"{options.correction}: {NO_COLUMNS}")
+        if rows is None:
+            options.running.note(f"{options.correction}: {NO_COLUMNS}")
     for name, text in texts:
         write_output(name, text.encode("utf-8", "surrogateescape"), overwrite=options.running.overwrite)
-    if not options.running.quiet:
-        say(*notes)
-        if options.format != "table" or not is_stream(options.output):
-            say(*findings(rig), *moves(found))
+    options.running.note(*notes)
+    if options.format != "table" or not is_stream(options.output):
+        options.running.note(*findings(rig), *moves(found))
     said = {False: "FAILED", None: "cannot tell"}
     say(*(f"{said[check.ok]}: {check.message}" for check in checks if not check.ok))
     return status_of(checks)

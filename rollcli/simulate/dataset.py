@@ -331,12 +331,12 @@ def run_simulate(
         sys.stdout.writelines(f"write {path}\n" for path in dataset.files())
         return ExitStatus.DONE
     nearest = max(spec.nearest_disparity for spec in dataset.specs)
-    if nearest > KITTI_TOP and not running.quiet:
-        say(
+    if nearest > KITTI_TOP:
+        running.note(
             f"the road reaches {nearest:.0f} px of disparity: what exceeds "
             f"{KITTI_TOP:.0f} px does not fit a KITTI PNG and has no data in {dataset.folder}/disparity"
         )
-    progress = TaskProgress(len(dataset.specs), quiet=running.quiet, verbose=running.verbose)
+    progress = TaskProgress(len(dataset.specs), running)
     progress.kept = len(dataset.kept or ())
     with stop_on_signals() as stop, progress:
         for stem in write_dataset(dataset, running.jobs, stop):

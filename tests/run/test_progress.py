@@ -48,7 +48,7 @@ def clock(monkeypatch):
 
 
 def test_a_line_is_written_every_half_minute_off_a_terminal(clock, capsys):
-    with TaskProgress(100) as progress:
+    with TaskProgress(100, RunningOptions()) as progress:
         progress.kept = 10
         for _ in range(8):
             clock.now += 10
@@ -65,7 +65,7 @@ def test_a_line_is_written_every_half_minute_off_a_terminal(clock, capsys):
     [(31, ""), (32, ", about 2 s left"), (91, ", about 2 min left"), (30_031, ", about 12 h left")],
 )
 def test_the_time_that_is_left_is_told_in_a_unit_that_fits(clock, capsys, total, left):
-    with TaskProgress(total) as progress:
+    with TaskProgress(total, RunningOptions()) as progress:
         progress.kept = 11
         for _ in range(20):
             clock.now += 1.5
@@ -103,7 +103,7 @@ class WithFailures(TaskProgress):
 @pytest.mark.parametrize(("columns", "longest"), [(60, 60), (0, 80)])
 def test_a_terminal_shows_a_bar_which_makes_room_for_messages_and_vanishes(monkeypatch, columns, longest):
     terminal = Terminal(monkeypatch, columns)
-    progress = WithFailures(10)
+    progress = WithFailures(10, RunningOptions())
     progress.kept = 4
     with progress:
         shown = terminal.read().rpartition("\r")[2]
@@ -125,7 +125,7 @@ def test_a_terminal_shows_a_bar_which_makes_room_for_messages_and_vanishes(monke
 
 
 def test_the_speed_leaves_out_what_an_interrupted_run_has_left(clock):
-    progress = TaskProgress(100)
+    progress = TaskProgress(100, RunningOptions())
     progress.kept = 50
     for _ in range(6):
         clock.now += 0.5
