@@ -247,9 +247,7 @@ def run_checks(
         In the order of the options.
     """
     checks = list(_checks(rig, gates, change))
-    if checks and missing:
-        checks.insert(0, Check("complete", None, missing))
-    return checks
+    return [Check("complete", None, missing), *checks] if checks and missing else checks
 
 
 def status_of(checks: Sequence[Check]) -> ExitStatus:
