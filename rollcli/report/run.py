@@ -16,9 +16,8 @@ from rollcli.report.page import Chart
 from rollcli.report.sources import Subject, choose, subjects
 from rollcli.report.summary import common_run
 from rollcli.rig.drive.assess import RigAssessment, assess_rig
-from rollcli.run.options import EncodingOptions
 from rollcli.run.outputs import check_named_once, listed_only
-from rollcli.run.progress import Progress
+from rollcli.run.progress import TaskProgress
 from rollcli.run.resume import recorded_calibrations, recorded_options
 from rollcli.run.rig import order_of, require_rows, unfinished
 from rollcli.run.workers.chunks import Work, Workers
@@ -106,7 +105,7 @@ def _write(
     from rollcli.report.content import report_page
     from rollcli.report.figures import chart_file
 
-    progress = Progress(len(found), options.running, EncodingOptions())
+    progress = TaskProgress(len(found), options.running)
     pictures = _take(found, options.running.jobs)
     if len(pictures) < len(found):
         progress.say("interrupted; nothing is written")
