@@ -12,12 +12,11 @@ import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, islice
-from pathlib import Path
 
 from rollcli.errors import InputError, UsageError
 from rollcli.extras import require_extra
 from rollcli.files import results
-from rollcli.files.atomic import is_file, is_folder, is_there, remove_leftovers, sync_files
+from rollcli.files.atomic import is_file, is_folder, is_there, remove_leftovers
 from rollcli.files.locking import exists_already, locked_folder, not_resumable
 from rollcli.files.storage import is_stream, list_names, open_stream, read_bytes, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url, located, public_name
@@ -77,7 +76,6 @@ class FileOutput(Output):
         super().__init__(record, kept)
         self._file, self._inputs = file, inputs
         self._rows: list[bytes] = []  # which wait for their images
-        self._folders: set[Path] = set()  # whose names are on the disk
         self._last = time.monotonic()
 
     def append(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
@@ -97,9 +95,7 @@ class FileOutput(Output):
 
     def _sync(self) -> None:
         """Force the images to the disk, then write the rows and force them too."""
-        if self._images:
-            sync_files(self._images, self._folders)
-            self._images.clear()
+        self._sync_images()
         self._write()
         self._inputs.sync()
         self._file.sync()
@@ -199,10 +195,6 @@ class PartsOutput(Output):
         if lines != old:
             self.record.check_owned()
             write_bytes(location, self._parts.encoded(number, lines), durable=True)
-
-    def _sync_images(self) -> None:
-        sync_files(self._images)
-        self._images.clear()
 
     def _write(self) -> None:
         self._sync_images()

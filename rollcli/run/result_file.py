@@ -17,7 +17,6 @@ from functools import lru_cache
 from hashlib import blake2b
 from itertools import combinations
 from pathlib import Path
-from typing import NamedTuple
 
 from rollcli.errors import InputError, OutputError, RollcliError, UsageError, output_error, writing
 from rollcli.files.atomic import atomic_file, is_file, look_at, write_atomic
@@ -270,16 +269,9 @@ def is_inputs(path: str) -> bool:
     return _LINE.match(data) is not None if data else True
 
 
-class _Line(NamedTuple):
-    """The fields of a line, each `_HEX` bytes; unknown where nothing told."""
-
-    name: bytes
-    state: bytes = _UNKNOWN
-    content: bytes = _UNKNOWN
-
-    @property
-    def text(self) -> bytes:
-        return b" ".join(self) + b"\n"
+def _line(name: bytes, state: bytes = _UNKNOWN, content: bytes = _UNKNOWN) -> bytes:
+    """Make a line of its fields, each `_HEX` bytes; unknown where nothing told."""
+    return b" ".join((name, state, content)) + b"\n"
 
 
 def inputs_line(frame: Frame, notes: Mapping[str, Note], at: Callable[[str], str] = str) -> bytes:
@@ -293,20 +285,16 @@ def inputs_line(frame: Frame, notes: Mapping[str, Note], at: Callable[[str], str
     at : callable
         Locates a path of the frame on this machine.
     """
-    return _described(frame, notes, at).text
-
-
-def _described(frame: Frame, notes: Mapping[str, Note], at: Callable[[str], str]) -> _Line:
     found = []
     for path in frame.reads():
         note = notes.get(at(path))
         if note is None and path == frame.mask:  # that of the frame before, which is not read again
             note = _mask_note(at(path), state_of(at(path)))
         if note is None:
-            return _Line(_name(frame))
+            return _line(_name(frame))
         found.append(note)
     content = [repr(frame.calibration), *(f"{note.size} {note.crc}" for note in found)]
-    return _Line(_name(frame), _state(frame, (note.state for note in found)), _hash(content))
+    return _line(_name(frame), _state(frame, (note.state for note in found)), _hash(content))
 
 
 @lru_cache(maxsize=1)
@@ -376,25 +364,25 @@ class Inputs:
 
     def take_unknown(self, frame: Frame) -> None:
         """Take a line that knows nothing of the frame that comes next."""
-        self.lines += _Line(_name(frame)).text
+        self.lines += _line(_name(frame))
 
     def has_changed(self, frame: Frame) -> bool:
         """Tell whether the frame whose line was taken last holds something else than its row was made from.
 
         Its files are read where their state is not the same; the line gets the new one if they still are.
         """
-        was = _Line(*bytes(self.lines[-_WIDTH:-1]).split(b" "))
-        if was.content == _UNKNOWN:
+        _, state_before, content = bytes(self.lines[-_WIDTH:]).split()
+        if content == _UNKNOWN:
             return self._updates
         if not self._updates and any(map(is_url, frame.reads())):  # that would take as long as reading them
             return False
         state = _state(frame, map(self._state_of, frame.reads()))
-        if was.state == state != _UNKNOWN:
+        if state_before == state != _UNKNOWN:
             return False
-        now = _described(frame, _read(frame.reads()), str)
-        if now.content != was.content:
+        now = inputs_line(frame, _read(frame.reads()))
+        if now.split()[-1] != content:
             return True
-        self.lines[-_WIDTH:] = now.text
+        self.lines[-_WIDTH:] = now
         return False
 
     def _line_at(self, place: int, name: bytes) -> bytes:

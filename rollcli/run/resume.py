@@ -12,12 +12,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import cached_property
 from itertools import islice
+from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from rollcli import __version__
 from rollcli.errors import InputError, OutputError
 from rollcli.files import results
-from rollcli.files.atomic import remove_leftovers
+from rollcli.files.atomic import remove_leftovers, sync_files
 from rollcli.files.locking import differences, not_resumable
 from rollcli.files.storage import write_bytes
 from rollcli.files.stores.locations import base_name, public_name
@@ -436,6 +437,7 @@ class Output:
         self._new_rows: dict[int, bytes] = {}
         self._new_notes: dict[int, bytes] = {}
         self._images: list[str] = []  # which must be on the disk before the rows that come next
+        self._folders: set[Path] = set()  # whose names are on the disk
 
     def parts_of(self, step: Step) -> Parts | None:
         """Say where workers write the rows of a step; None: all come back."""
@@ -479,6 +481,12 @@ class Output:
 
     def _take_images(self, frames: Sequence[Frame], status: bytes) -> None:
         self._images += outputs.local_files(frames, status, self._plan.options.writes)
+
+    def _sync_images(self) -> None:
+        """Force the images to the disk."""
+        if self._images:
+            sync_files(self._images, self._folders)
+            self._images.clear()
 
     def _end_replacing(self) -> None:
         """Forget the rows that are written, and what told their images from those of other programs."""
