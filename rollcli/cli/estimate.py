@@ -67,34 +67,28 @@ def _from_environment(ctx: click.Context) -> Iterator[str]:
                 yield from (flag, str(text))
 
 
+_RESULT_FILE = OutputFile(
+    (".csv", ".jsonl", ".ndjson", ".parquet"), "CSV (.csv), JSON Lines (.jsonl) or Parquet (.parquet)"
+)
+# what options need to have an effect
+_PARTS = Needs(
+    lambda ctx: ResultOptions(ctx.params["output"], ctx.params["format"]).in_parts,
+    "only Parquet and results in an object store have parts",
+)
+_SHARDS = Needs(lambda ctx: ctx.params["shard"] != (1, 1), "all frames are one shard")
+
 result_options = record(
     "result",
     "Result",
     ResultOptions,
-    option(
-        "-o, --output",
-        OutputFile(
-            (".csv", ".jsonl", ".ndjson", ".parquet"), "CSV (.csv), JSON Lines (.jsonl) or Parquet (.parquet)"
-        ),
-    ),
+    option("-o, --output", _RESULT_FILE),
     option("--format", Choice("csv", "jsonl", "parquet")),
-    option(
-        "--part-rows",
-        Number("N", at_least=1, whole=True),
-        Needs(
-            lambda ctx: ResultOptions(ctx.params["output"], ctx.params["format"]).in_parts,
-            "only Parquet and results in an object store have parts",
-        ),
-    ),
+    option("--part-rows", Number("N", at_least=1, whole=True), _PARTS),
     option("--resume", FLAG),
     option("--update", FLAG),
     option("--retry-failed", FLAG),
     option("--shard", SHARD),
-    option(
-        "--shard-by",
-        Choice("every", "range"),
-        Needs(lambda ctx: ctx.params["shard"] != (1, 1), "all frames are one shard"),
-    ),
+    option("--shard-by", Choice("every", "range"), _SHARDS),
     option("--fail-fast", FLAG),
     option("--timing", FLAG),
 )

@@ -32,6 +32,7 @@ def _has_pairs(ctx: click.Context) -> bool:
     return ctx.command.name == "disparity" or any(ctx.params.get(name) for name in named)
 
 
+# what options need to have an effect
 _PAIRS = Needs(_has_pairs, "the inputs are maps, which are not matched")
 _MAPS = Needs(lambda ctx: not _has_pairs(ctx), "pairs are matched, and no stored disparities are read")
 _HORIZON = Needs(
@@ -41,6 +42,36 @@ _BASELINE = Needs(
     lambda ctx: ctx.command.name != "vdisparity" or ctx.params["encoding"] == "depth",
     "the horizon does not depend on it; only --encoding depth needs it",
 )
+_STAMPS = Needs(lambda ctx: ctx.params["left_topic"], "only views of a bag are paired by their stamps")
+_MEASURED = Needs(
+    lambda ctx: ctx.params["vertical_offset"] is None, "--vertical-offset says how the right image lies"
+)
+_PARABOLA = Needs(
+    lambda ctx: ctx.params["road"] != "all" or ctx.params["method"] not in AREAS,
+    "--method {method} fits planes",
+)
+_LEARNS = Needs(lambda ctx: ctx.params["method"] == "gd", "only --method gd has a learning rate")
+_ITERATES = Needs(
+    lambda ctx: ctx.params["method"] not in AREAS, "--method {method} does not iterate on the angle"
+)
+_SEARCHES = Needs(  # areas chooses among its planes by their roll
+    lambda ctx: ctx.params["road"] != "all" or ctx.params["method"] == "areas", "--road all looks for no road"
+)
+_PREVIEW = Needs(
+    lambda ctx: any(ctx.params.get(each) for each in ("preview", "heights_preview")),
+    "only previews of heights have colours",
+)
+_OWN_FORMAT = Needs(
+    lambda ctx: _has_pairs(ctx) or ctx.params["heights"], "a map keeps the format of its input"
+)
+_WRITES_MAPS = Needs(
+    lambda ctx: (
+        ctx.command.name == "disparity"
+        or any(ctx.params[kind.name] for kind in records.KINDS if kind.holds != "picture")
+    ),
+    "only --disparity, --derotated and --heights write maps",
+)
+_HERE = Needs(lambda ctx: not ctx.params.get("scheduler"), "the workers of --scheduler do the work")
 
 
 _folders = (
@@ -80,11 +111,7 @@ topic_options = record(
     records.TopicOptions,
     option("--left-topic", Text("TOPIC")),
     option("--right-topic", Text("TOPIC")),
-    option(
-        "--sync-tolerance",
-        Number("MS", at_least=0),
-        Needs(lambda ctx: ctx.params["left_topic"], "only views of a bag are paired by their stamps"),
-    ),
+    option("--sync-tolerance", Number("MS", at_least=0), _STAMPS),
 )
 
 stereo_options = record(
@@ -99,14 +126,7 @@ stereo_options = record(
     option("--speckle-size", Number("PX", at_least=0, whole=True)),
     option("--speckle-range", Number("PX", at_least=0, whole=True)),
     option("--downscale", Number("F", at_least=1)),
-    option(
-        "--align",
-        FilePath("auto|off|FILE"),
-        Needs(
-            lambda ctx: ctx.params["vertical_offset"] is None,
-            "--vertical-offset says how the right image lies",
-        ),
-    ),
+    option("--align", FilePath("auto|off|FILE"), _MEASURED),
     option("--vertical-offset", Number("PX", auto=None), default="auto"),
     only_with=[_PAIRS],
 )
@@ -139,63 +159,20 @@ method_options = record(
         Choice(*METHODS),
         text="; ".join(f"{name}: {method.summary}" for name, method in METHODS.items()) + ".",
     ),
-    option(
-        "--model",
-        Choice(*MODELS),
-        Needs(
-            lambda ctx: ctx.params["road"] != "all" or ctx.params["method"] not in AREAS,
-            "--method {method} fits planes",
-        ),
-    ),
+    option("--model", Choice(*MODELS), _PARABOLA),
     option("--road", Choice(*ROADS)),
-    option(
-        "--lambda0",
-        Number("FLOAT", above=0, auto="auto"),
-        Needs(lambda ctx: ctx.params["method"] == "gd", "only --method gd has a learning rate"),
-    ),
-    option(
-        "--tolerance",
-        Number("DEG", above=0, at_most=90),
-        Needs(
-            lambda ctx: ctx.params["method"] not in AREAS, "--method {method} does not iterate on the angle"
-        ),
-    ),
-    option(
-        "--max-roll",
-        Number("DEG", above=0, at_most=MAX_ROLL_LIMIT_DEG),
-        Needs(  # areas chooses among its planes by their roll
-            lambda ctx: ctx.params["road"] != "all" or ctx.params["method"] == "areas",
-            "--road all looks for no road",
-        ),
-    ),
+    option("--lambda0", Number("FLOAT", above=0, auto="auto"), _LEARNS),
+    option("--tolerance", Number("DEG", above=0, at_most=90), _ITERATES),
+    option("--max-roll", Number("DEG", above=0, at_most=MAX_ROLL_LIMIT_DEG), _SEARCHES),
     option("--max-interval", Number("DEG", above=0, at_most=90)),
     option("--seed", Number("INT", at_least=0, whole=True)),
 )
 
 
-heights_range_option = option(
-    "--heights-range",
-    WIDE_SPAN,
-    Needs(
-        lambda ctx: any(ctx.params.get(each) for each in ("preview", "heights_preview")),
-        "only previews of heights have colours",
-    ),
-    section="Output",
-)
-
+heights_range_option = option("--heights-range", WIDE_SPAN, _PREVIEW, section="Output")
 
 save_as_option = option(
-    "--save-as",
-    Choice("png", "tiff", "npy"),
-    Needs(lambda ctx: _has_pairs(ctx) or ctx.params["heights"], "a map keeps the format of its input"),
-    Needs(
-        lambda ctx: (
-            ctx.command.name == "disparity"
-            or any(ctx.params[kind.name] for kind in records.KINDS if kind.holds != "picture")
-        ),
-        "only --disparity, --derotated and --heights write maps",
-    ),
-    section="Output",
+    "--save-as", Choice("png", "tiff", "npy"), _OWN_FORMAT, _WRITES_MAPS, section="Output"
 )
 
 output_folder_option = option("-o, --output", DIR, required=True, section="Output")
@@ -210,11 +187,7 @@ image_options = record(
 )
 
 _running = (
-    option(
-        "-j, --jobs",
-        Number("N", at_least=1, whole=True),
-        Needs(lambda ctx: not ctx.params.get("scheduler"), "the workers of --scheduler do the work"),
-    ),
+    option("-j, --jobs", Number("N", at_least=1, whole=True), _HERE),
     option("--overwrite", FLAG),
     option("--dry-run", FLAG),
     option("-q, --quiet", FLAG),
