@@ -15,6 +15,8 @@ from rollcli.run.workers.pool import PoolExecutor, prepare_worker
 if TYPE_CHECKING:
     from rollcli.run.workers.cluster import ClusterExecutor  # the extra `cluster`
 
+    Executor = PoolExecutor[Task, Result] | ClusterExecutor[Task, Result]
+
 # chunks that are not done: a worker's own, one that waits there, and one for whichever worker is fast
 _IN_FLIGHT = 3
 # and with those that are done, a few rows each, while the oldest is not: its worker may be slow, or its tasks
@@ -22,10 +24,7 @@ _AHEAD = 12
 
 
 def in_order(
-    tasks: Sequence[Task],
-    work: Work[Task, Result],
-    executor: "PoolExecutor[Task, Result] | ClusterExecutor[Task, Result]",
-    stop: Stop,
+    tasks: Sequence[Task], work: Work[Task, Result], executor: "Executor[Task, Result]", stop: Stop
 ) -> Generator[Any, None, None]:
     """Yield what `Work.join` made of the results of some tasks and of those after them, in the tasks' order.
 
@@ -154,9 +153,7 @@ def _run_here(tasks: Sequence[Task], work: Work[Task, Result], stop: Stop) -> Ge
         yield work.join(Span([task], position, work.tell()), [work.do(task)])
 
 
-def _executor(
-    count: int, work: Work[Task, Result], workers: Workers
-) -> "PoolExecutor[Task, Result] | ClusterExecutor[Task, Result] | None":
+def _executor(count: int, work: Work[Task, Result], workers: Workers) -> "Executor[Task, Result] | None":
     """Make the executor; None: this process does the tasks. The cluster's loads only when it is used."""
     if workers.scheduler is not None:
         from rollcli.run.workers.cluster import ClusterExecutor
