@@ -74,7 +74,7 @@ def _known_angles(frames: Sequence[Frame], options: PaperOptions) -> Mapping[str
 
 def _run(frames: Sequence[Frame], truth: Mapping[str, KnownPose], options: PaperOptions) -> ExitStatus:
     work = Work(partial(examine_file, options=options, truth=truth), lost)
-    progress = Progress(len(frames), options.running, options.encoding, statuses=("ok",))
+    progress = Progress(len(frames), options, statuses=("ok",))
     examined: list[Examined] = []
     with (
         stop_on_signals() as stop,

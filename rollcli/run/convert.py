@@ -46,7 +46,7 @@ def run_conversion(options: ConvertOptions) -> ExitStatus:
     if outputs.listed_only(files, running):
         return ExitStatus.DONE
     require_scheduler(running.scheduler)
-    progress = Progress(len(frames), running, options.encoding, statuses=("ok",))
+    progress = Progress(len(frames), options, statuses=("ok",))
     work, workers = work_on(frames, options.frame), workers_for(frames, options)
     work.clear(frames)
     with stop_on_signals() as stop, progress, closing(run_tasks(frames, work, stop, workers)) as results:

@@ -49,7 +49,7 @@ def _run(plan: Plan, resume_command: str) -> ExitStatus:
     require_scheduler(options.running.scheduler)
     with open_output(plan) as output:
         kept = output.kept
-        progress = Progress(len(plan.frames), options.running, options.encoding, summary=kept.summary)
+        progress = Progress(len(plan.frames), options, ("ok", "suspect"), kept.summary)
         notes = calibration_notes(plan.frames) if options.calibration.given else []
         for note in (*notes[:_NOTES], *kept.notes()):
             progress.note(note)

@@ -19,7 +19,7 @@ from rollcli.messages import say
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.quantities import COLUMNS
 from rollcli.run.frame import FrameResult
-from rollcli.run.options import EncodingOptions, RunningOptions
+from rollcli.run.options import FramesOptions, RunningOptions
 from rollcli.stereo.misalignment import advice_of
 
 _MOST_FRAMES = 1_000_000  # that the rig's roll is told of: their names and numbers take 150 MB
@@ -307,9 +307,8 @@ class Progress(TaskProgress):
     ----------
     total : int
         Frames to do.
-    running : RunningOptions
-    encoding : EncodingOptions
-        An encoding that was found rather than given is named once.
+    options : FramesOptions
+        How much to say. An encoding that was found rather than given is named once.
     statuses : sequence of str
         The statuses of rows that the last line counts, besides "error".
     summary : RunSummary or None
@@ -317,18 +316,13 @@ class Progress(TaskProgress):
     """
 
     def __init__(
-        self,
-        total: int,
-        running: RunningOptions,
-        encoding: EncodingOptions,
-        statuses: Sequence[str] = ("ok", "suspect"),
-        summary: RunSummary | None = None,
+        self, total: int, options: FramesOptions, statuses: Sequence[str], summary: RunSummary | None = None
     ) -> None:
-        super().__init__(total, running)
+        super().__init__(total, options.running)
         self.summary = summary or RunSummary()
         self.kept = self.summary.frames
         self._statuses = statuses
-        self._auto = encoding.encoding == "auto" and encoding.scale is None
+        self._auto = options.encoding.encoding == "auto" and options.encoding.scale is None
         self._failures, self._warnings = Causes(), Causes()
 
     def counted(self) -> dict[str, int]:
