@@ -23,7 +23,7 @@ from rollcli.messages import say, show_tracebacks
 OTHER = "Other options"
 Function = Callable[..., Any]
 Declaration = Callable[[Function], Function]
-_ALWAYS = (ExitStatus.FAILED, ExitStatus.USAGE, ExitStatus.INTERRUPTED)
+_ALWAYS = {each: each.meaning for each in (ExitStatus.FAILED, ExitStatus.USAGE, ExitStatus.INTERRUPTED)}
 _OF_FRAMES = {each: each.meaning for each in (ExitStatus.DONE, ExitStatus.FRAMES_FAILED)}
 
 
@@ -84,24 +84,16 @@ class Option(click.Option):
 class Command(click.Command):
     """A command whose help reads like a manual page: options by section, examples, exit status.
 
-    Parameters
+    Attributes
     ----------
     examples : sequence of (str, str)
         A purpose, and the command line for it; several lines are steps.
     statuses : mapping of ExitStatus to str
-        How it ends, where this is not how frames are worked through; wrong usage and so on are added.
+        How it ends.
     """
 
-    def __init__(
-        self,
-        *args: Any,
-        examples: Sequence[tuple[str, str]] = (),
-        statuses: Mapping[ExitStatus, str] = _OF_FRAMES,
-        **attributes: Any,
-    ) -> None:
-        super().__init__(*args, **attributes)
-        self.examples = tuple(examples)
-        self.statuses = dict(sorted({**{each: each.meaning for each in _ALWAYS}, **statuses}.items()))
+    examples: Sequence[tuple[str, str]] = ()
+    statuses: Mapping[ExitStatus, str]
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the words, with the values that options have by themselves."""
@@ -163,7 +155,7 @@ def option(names: str, kind: ParamType, *needs: Needs, text: str = "", **attribu
     *needs : Needs
         What it needs to have an effect.
     text : str, optional
-        Its help; by default what the docstring of a record says of its field: see `record` and `command`.
+        Its help; by default what the docstring of a record says of its field: see `Section` and `command`.
     **attributes
         What else `click.option` and `Option` take.
     """
@@ -173,43 +165,45 @@ def option(names: str, kind: ParamType, *needs: Needs, text: str = "", **attribu
     return click.option(*names.split(", "), cls=Option, help=text, only_with=needs, **attributes)
 
 
-def record(
-    name: str,
-    title: str,
-    make: Callable[..., Any],
-    *declarations: Declaration,
-    only_with: Sequence[Needs] = (),
-) -> Declaration:
-    """Declare a section of options that the command receives as one record.
+class Section(NamedTuple):
+    """A section of options that the command receives as one record.
 
-    An option that declares no default or no help has those of the record's field: see `_fill`.
-
-    Parameters
+    Attributes
     ----------
     name : str
-        What the command's own record, or its function, calls it.
+        What the command's own record, or its function, calls the record.
     title : str
         The heading in the help.
     make : callable
         Makes the record of the values; its fields have defaults and help.
-    *declarations
-        What `option` and `click.argument` return.
     only_with : sequence of Needs
-        See `Option`.
+        What all of its options need to have an effect; see `Option`.
     """
 
-    def declare(function: Function) -> Function:
-        count = len(getattr(function, "__click_params__", ()))
-        for each in reversed(declarations):
-            each(function)
-        params = getattr(function, "__click_params__", [])[count:]
-        for param in params:
-            if isinstance(param, Option):
-                param.section, param.only_with = title, (*only_with, *param.only_with)
-        vars(function).setdefault("__records__", {})[name] = make, _fill(params, make)
-        return function
+    name: str
+    title: str
+    make: Callable[..., Any]
+    only_with: Sequence[Needs] = ()
 
-    return declare
+    def of(self, *declarations: Declaration) -> Declaration:
+        """Declare its options: what `option` and `click.argument` return.
+
+        An option that declares no default or no help has those of the record's field: see `_fill`.
+        """
+
+        def declare(function: Function) -> Function:
+            count = len(getattr(function, "__click_params__", ()))
+            for each in reversed(declarations):
+                each(function)
+            params = getattr(function, "__click_params__", [])[count:]
+            for param in params:
+                if isinstance(param, Option):
+                    param.section, param.only_with = self.title, (*self.only_with, *param.only_with)
+            records = vars(function).setdefault("__records__", {})
+            records[self.name] = self.make, _fill(params, self.make)
+            return function
+
+        return declare
 
 
 # of a docstring's sections Attributes and Examples
@@ -245,12 +239,15 @@ def _fill(params: Sequence[click.Parameter], record: Any) -> dict[str, str]:
     return field_of
 
 
-def command(make: Callable[..., Any] | None = None, **attributes: Any) -> Callable[[Function], Command]:
+def command(
+    make: Callable[..., Any] | None = None, statuses: Mapping[ExitStatus, str] = _OF_FRAMES, **attributes: Any
+) -> Callable[[Function], Command]:
     """Make a command of a function, named after it, which returns the exit status.
 
     The function receives what `make` makes of the records and of the options and arguments that are part of
-    none; those have their defaults and help from its fields, as in `record`. Without `make` it receives them
-    by their names. Every command has --config.
+    none; those have their defaults and help from its fields, as in `Section`. Without `make` it receives them
+    by their names. Every command has --config. `statuses` says how it ends, where that is not how frames are
+    worked through; wrong usage and so on are added.
 
     Its docstring is the help; the section Examples has purposes, and indented below each its command, or
     several steps.
@@ -269,10 +266,10 @@ def command(make: Callable[..., Any] | None = None, **attributes: Any) -> Callab
             click.get_current_context().exit(function(**named) if make is None else function(make(**named)))
 
         text, _, examples = inspect.cleandoc(function.__doc__ or "").partition("\n\nExamples\n--------\n")
-        shown = [(purpose, inspect.cleandoc(steps)) for purpose, steps in _EXAMPLE.findall(examples)]
-        return Command(
-            function.__name__, callback=run, params=params, help=text, examples=shown, **attributes
-        )
+        made = Command(function.__name__, callback=run, params=params, help=text, **attributes)
+        made.examples = [(purpose, inspect.cleandoc(steps)) for purpose, steps in _EXAMPLE.findall(examples)]
+        made.statuses = dict(sorted({**_ALWAYS, **statuses}.items()))
+        return made
 
     return declare
 
@@ -284,12 +281,10 @@ def _tell_idle(ctx: click.Context) -> None:
     """
     idle: dict[str, list[str]] = {}
     for param in ctx.command.params:
-        if not isinstance(param, Option):
-            continue
-        if ctx.get_parameter_source(str(param.name)) is ParameterSource.COMMANDLINE:
-            missing = next((each for each in param.only_with if not each.holds(ctx)), None)
-            if missing is not None:
-                idle.setdefault(missing.reason.format(**ctx.params), []).append(max(param.opts, key=len))
+        given = ctx.get_parameter_source(str(param.name)) is ParameterSource.COMMANDLINE
+        needs = param.only_with if given and isinstance(param, Option) else ()
+        if missing := next((each for each in needs if not each.holds(ctx)), None):
+            idle.setdefault(missing.reason.format(**ctx.params), []).append(max(param.opts, key=len))
     for reason, flags in idle.items():
         say(f"{', '.join(flags)}: no effect here: {reason}")
 

@@ -10,7 +10,7 @@ import click
 from click.core import ParameterSource
 
 from rollcli.cli import options as shared
-from rollcli.cli.command import Needs, command, option, record
+from rollcli.cli.command import Needs, Section, command, option
 from rollcli.cli.types import FLAG, SHARD, Choice, Number, OutputFile
 from rollcli.messages import without_secrets
 from rollcli.run.options import EstimateOptions, ResultOptions
@@ -77,10 +77,7 @@ _PARTS = Needs(
 )
 _SHARDS = Needs(lambda ctx: ctx.params["shard"] != (1, 1), "all frames are one shard")
 
-result_options = record(
-    "result",
-    "Result",
-    ResultOptions,
+result_options = Section("result", "Result", ResultOptions).of(
     option("-o, --output", _RESULT_FILE),
     option("--format", Choice("csv", "jsonl", "parquet")),
     option("--part-rows", Number("N", at_least=1, whole=True), _PARTS),

@@ -5,7 +5,7 @@ from dataclasses import replace
 import click
 
 from rollcli.cli import options as shared
-from rollcli.cli.command import command, option, record
+from rollcli.cli.command import Section, command, option
 from rollcli.cli.types import DIR, FILE, PATH, TABLE_FILE, TABLE_FORMATS, TURNS, Choice, Number, table_format
 from rollcli.evaluate.options import AccuracyOptions, ExperimentOptions, PaperOptions
 
@@ -33,10 +33,7 @@ def accuracy(options: AccuracyOptions) -> int:
     return run_accuracy(replace(options, format=table_format(options.format, options.output)))
 
 
-experiment_options = record(
-    "experiments",
-    "Experiments",
-    ExperimentOptions,
+experiment_options = Section("experiments", "Experiments", ExperimentOptions).of(
     option("-o, --output", DIR, required=True),
     option("--turns", TURNS),
     option("--timed", Number("N", at_least=1, whole=True)),

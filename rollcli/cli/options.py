@@ -4,7 +4,7 @@ from typing import get_args
 
 import click
 
-from rollcli.cli.command import Needs, option, record
+from rollcli.cli.command import Needs, Section, option
 from rollcli.cli.types import (
     ANY_NUMBER,
     DIR,
@@ -83,41 +83,29 @@ _folders = (
 
 _named = (click.argument("inputs", nargs=-1, type=PATH), option("--files-from", FILE))
 
-input_options = record(
-    "inputs",
-    "Input",
-    records.InputOptions,
+input_options = Section("inputs", "Input", records.InputOptions).of(
     *_named,
     option("--sorted", FLAG),
     option("--topic", Text("TOPIC"), _MAPS),
     *_folders,
 )
 
-pair_input_options = record("inputs", "Input", records.InputOptions, *_named, *_folders)
+pair_input_options = Section("inputs", "Input", records.InputOptions).of(*_named, *_folders)
 
-pair_options = record(
-    "pairs",
-    "Stereo pairs",
-    records.PairOptions,
+pair_options = Section("pairs", "Stereo pairs", records.PairOptions).of(
     option("--left", PATH),
     option("--right", PATH),
     option("--match", Choice("name", "order"), _PAIRS),
     option("--side-by-side", Choice(*get_args(records.Layout)), without_word="left-right"),
 )
 
-topic_options = record(
-    "topics",
-    "Views of a bag",
-    records.TopicOptions,
+topic_options = Section("topics", "Views of a bag", records.TopicOptions).of(
     option("--left-topic", Text("TOPIC")),
     option("--right-topic", Text("TOPIC")),
     option("--sync-tolerance", Number("MS", at_least=0), _STAMPS),
 )
 
-stereo_options = record(
-    "stereo",
-    "Stereo matching (OpenCV SGBM)",
-    StereoOptions,
+stereo_options = Section("stereo", "Stereo matching (OpenCV SGBM)", StereoOptions, [_PAIRS]).of(
     option("--num-disparities", Number("PX", above=0, whole=True, auto=None), default="auto"),
     option("--min-disparity", Number("PX", whole=True)),
     option("--block-size", Number("PX", at_least=1, whole=True)),
@@ -128,32 +116,21 @@ stereo_options = record(
     option("--downscale", Number("F", at_least=1)),
     option("--align", FilePath("auto|off|FILE"), _MEASURED),
     option("--vertical-offset", Number("PX", auto=None), default="auto"),
-    only_with=[_PAIRS],
 )
 
-encoding_options = record(
-    "encoding",
-    "What the stored numbers mean",
-    records.EncodingOptions,
+encoding_options = Section("encoding", "What the stored numbers mean", records.EncodingOptions, [_MAPS]).of(
     option("--encoding", Choice("auto", "px", "kitti", "cityscapes", "sgbm", "depth", "foundationstereo")),
     option("--scale", Number("F", but=0)),
     option("--invalid", ANY_NUMBER, multiple=True),
-    only_with=[_MAPS],
 )
 
-region_options = record(
-    "region",
-    "Which pixels",
-    records.RegionOptions,
+region_options = Section("region", "Which pixels", records.RegionOptions).of(
     option("--mask", PATH),
     option("--roi", ROI),
     option("--polygon", POLYGON),
 )
 
-method_options = record(
-    "method",
-    "Method",
-    records.MethodOptions,
+method_options = Section("method", "Method", records.MethodOptions).of(
     option(
         "--method",
         Choice(*METHODS),
@@ -177,10 +154,7 @@ save_as_option = option(
 
 output_folder_option = option("-o, --output", DIR, required=True, section="Output")
 
-image_options = record(
-    "images",
-    "Images to write, named after their input",
-    records.ImageOptions,
+image_options = Section("images", "Images to write, named after their input", records.ImageOptions).of(
     *(option(f"--{kind.name.replace('_', '-')}", DIR) for kind in records.KINDS),
     heights_range_option,
     save_as_option,
@@ -194,21 +168,22 @@ _running = (
     option("-v, --verbose", FLAG),
 )
 
-running_options = record("running", "Running", records.RunningOptions, *_running)
+running_options = Section("running", "Running", records.RunningOptions).of(*_running)
 
-cluster_options = record(
-    "running", "Running", records.RunningOptions, *_running, option("--scheduler", Text("ADDRESS"))
+cluster_options = Section("running", "Running", records.RunningOptions).of(
+    *_running, option("--scheduler", Text("ADDRESS"))
 )
 
 
-calibration_options = record(
+calibration_options = Section(
     "calibration",
     "Calibration of the rectified pair, for pitch, height, horizon and depth maps",
     CalibrationOptions,
+    [_HORIZON],
+).of(
     option("--calib", PATH, multiple=True, metavar="PATH"),
     option("--focal", Number("PX", above=0)),
     option("--principal-point", POINT),
     option("--baseline", Number("M", above=0), _BASELINE),
     option("--doffs", Number("PX")),
-    only_with=[_HORIZON],
 )

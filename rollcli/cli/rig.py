@@ -5,15 +5,14 @@ from dataclasses import replace
 import click
 
 from rollcli.cli import options as shared
-from rollcli.cli.command import command, option, record
+from rollcli.cli.command import Section, command, option
 from rollcli.cli.types import FILE, FLAG, PATH, TABLE_FILE, TABLE_FORMATS, Choice, Number, Text, table_format
 from rollcli.errors import ExitStatus
 from rollcli.run.options import GateOptions, RigOptions
 
-gate_options = record(
-    "gates",
-    "Checks: exit status 4 when one fails, 5 when none fails and one cannot be told",
-    GateOptions,
+gate_options = Section(
+    "gates", "Checks: exit status 4 when one fails, 5 when none fails and one cannot be told", GateOptions
+).of(
     option("--expect-roll", Number("DEG")),
     option("--expect-pitch", Number("DEG")),
     option("--expect-height", Number("M")),

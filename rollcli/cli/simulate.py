@@ -5,16 +5,13 @@ from dataclasses import replace
 import click
 
 from rollcli.cli import options as shared
-from rollcli.cli.command import command, option, record
+from rollcli.cli.command import Section, command, option
 from rollcli.cli.estimate import one_start, resume_command
 from rollcli.cli.types import DIR, FLAG, IMAGE_SIZE, POINT, Choice, Number, span
 from rollcli.run.options import RunningOptions
 from rollcli.simulate.options import CROSS_SECTIONS, MAX_DIPS, MIXED, ROUGHNESS, SCENES, SimulateOptions
 
-simulate_options = record(
-    "options",
-    "What to render",
-    SimulateOptions,
+simulate_options = Section("options", "What to render", SimulateOptions).of(
     option("--frames", Number("N", at_least=1, whole=True)),
     option("--scene", Choice(*SCENES, MIXED)),
     option("--roll", span(-90, 90)),
