@@ -28,7 +28,7 @@ from rollcli.files.stores.locations import is_url, public_name, tasks_in_hand
 from rollcli.files.stores.objects import object_owner
 from rollcli.run.frame import Frame, FrameResult, ReadAs, failed_frame
 from rollcli.run.options import FrameOptions, FramesOptions, ResultOptions
-from rollcli.run.outputs import every_path, files_of, local_files, write_outputs
+from rollcli.run.outputs import files_of, local_files, write_outputs
 from rollcli.run.progress import Figures
 from rollcli.run.result_file import inputs_line, part_inputs_path
 from rollcli.run.workers.chunks import Span, Work, Workers
@@ -43,8 +43,7 @@ def do_frame(frame: Frame, options: FrameOptions) -> FrameResult:
 
 def lost_frame(frame: Frame, reason: str, options: FrameOptions) -> FrameResult:
     """Make the row of a frame whose worker died, and remove its files of an earlier run."""
-    paths = every_path(frame, options.writes)
-    write_outputs({}, paths, replaces=options.replaces, retry_of=options.retry_of)
+    write_outputs(frame, {}, options)
     return failed_frame(frame, reason)
 
 

@@ -33,7 +33,7 @@ from rollcli.run.options import (
     HeightsOptions,
     VDisparityOptions,
 )
-from rollcli.run.outputs import every_path, possible_paths, roomy_path, write_outputs
+from rollcli.run.outputs import possible_paths, roomy_path, write_outputs
 from rollcli.run.read import Source, guarded, read_source
 from rollcli.run.result_file import inputs_line
 
@@ -64,8 +64,7 @@ def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
 
     with noting(options.notes) as notes:
         result = guarded(frame, work)
-    paths = every_path(frame, options.writes)
-    write_outputs(files, paths, replaces=options.replaces, retry_of=options.retry_of)
+    write_outputs(frame, files, options)
     elapsed = 1000 * (time.perf_counter() - start)
     noted = {**notes, **(frame.decoded.notes if frame.decoded else {})}
     inputs = inputs_line(frame, noted, options.at) if options.notes else b""

@@ -20,7 +20,7 @@ from rollcli.files.storage import create, read_bytes, remove, remove_all, write_
 from rollcli.files.stores.locations import is_object_url, is_url, public_name, within
 from rollcli.files.stores.objects import list_objects
 from rollcli.run.frame import Frame
-from rollcli.run.options import ENDING_OF_FORMAT, RunningOptions, Written
+from rollcli.run.options import ENDING_OF_FORMAT, FrameOptions, RunningOptions, Written
 
 
 def possible_paths(frame: Frame, writes: Iterable[Written]) -> Iterator[tuple[str, list[str]]]:
@@ -53,36 +53,33 @@ def files_of(frames: Iterable[Frame], writes: Sequence[Written]) -> Iterator[str
         yield from every_path(frame, writes)
 
 
-def write_outputs(
-    files: Mapping[str, bytes], paths: Collection[str], *, replaces: bool, retry_of: str = ""
-) -> None:
+def write_outputs(frame: Frame, files: Mapping[str, bytes], options: FrameOptions) -> None:
     """Write the files of a frame, each whole or not at all; a failed frame has none.
 
     Parameters
     ----------
+    frame : Frame
     files : mapping from str to bytes
         What is written, by its path.
-    paths : collection of str
-        All that may be written for the frame.
-    replaces : bool
-        Whether files of an earlier run are replaced, and those that are not written now removed: they would
-        pass for this run's. Otherwise nothing that another run or program wrote is touched.
-    retry_of : str
-        The result whose failed frame is done again. What an earlier retry of it made and did not live to
-        write a row of is taken back: a mark beside such a file says so until the row is in the result.
+    options : FrameOptions
+        Where it `replaces` files of an earlier run, those that are not written now are removed: they would
+        pass for this run's. Otherwise nothing that another run or program wrote is touched. What an earlier
+        retry of the result `retry_of` made and did not live to write a row of is taken back: a mark beside
+        such a file says so until the row is in the result.
 
     Raises
     ------
     OutputError
         One cannot be written, or must not be replaced.
     """
-    if retry_of and not replaces:
-        _write_marked(files, paths, retry_of)
+    paths = every_path(frame, options.writes)
+    if options.retry_of and not options.replaces:
+        _write_marked(files, paths, options.retry_of)
         return
-    write = write_bytes if replaces else _write_new
+    write = write_bytes if options.replaces else _write_new
     for path, data in files.items():
         write(path, data)
-    if replaces:
+    if options.replaces:
         for path in set(paths) - files.keys():
             with contextlib.suppress(OutputError):  # the row says what is wrong with the frame
                 remove(path)
