@@ -121,7 +121,7 @@ def paper_files(
     """
     from rollcli.evaluate.paper_figures import paper_figures
     from rollcli.pictures.figures import PRINT
-    from rollcli.report.figures import chart_file
+    from rollcli.report.figures import chart_file, stills
     from rollcli.report.page import render_page
 
     tables = all_tables(found, failed, times)
@@ -136,6 +136,7 @@ def paper_files(
         methods=METHOD_NAMES,
         tables=tables,
         charts=figures,
+        stills=stills,
         found=found,
         failed=failed,
         times=times,

@@ -1,6 +1,7 @@
 """Read what a user named, up to a size: files, pipes and standard input. Import-light."""
 
 import codecs
+import contextlib
 import os
 import stat
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import BinaryIO
 from rollcli.errors import InputError, reading
 from rollcli.files.atomic import look_at
 
-# The largest map or picture that is decoded takes 512 MB (codecs/raw_map); a result of a million rows 200 MB
+# The largest map or picture that is decoded takes 512 MB (codecs/arrays); a result of a million rows 200 MB
 MOST_BYTES = 2**30
 MOST_LISTED = 2**28  # of a list of files: two million paths
 MOST_SETTINGS = 2**20  # of a TOML file, or a correction
@@ -58,31 +59,27 @@ def read_given(path: str | Path, most: int = MOST_BYTES) -> bytes:
 
 
 def read_stream(file: BinaryIO, name: str, most: int = MOST_BYTES) -> bytes:
-    """Return the bytes of an open file, which errors call `name`; see `read_given`."""
-    most, size = _limit_of(file, most)
-    if size > most:
-        raise too_large(name, size, most)
-    return read_up_to(file, name, size, most)
-
-
-def read_up_to(file: BinaryIO, name: str, size: int, most: int) -> bytes:
-    """Return the bytes of an open file, which says that it has `size` of them.
+    """Return the bytes of an open file, which errors call `name`; see `read_given`.
 
     Not by one read of `most`: Python sets aside a gigabyte of addresses before it, which a limit may forbid.
-
-    Raises
-    ------
-    InputError
-        It has more than `most`: it has grown, or does not say its size.
     """
-    pieces, left, wanted = list[bytes](), most + 1, min(size, most) + 1
+    size = 0
+    with contextlib.suppress(OSError, ValueError):  # no file of the system's
+        status = os.fstat(file.fileno())
+        if stat.S_ISREG(status.st_mode):
+            size = status.st_size
+        elif stat.S_ISCHR(status.st_mode) and not os.isatty(file.fileno()):
+            most = min(most, _OF_DEVICES)
+    if size > most:
+        raise too_large(name, size, most)
+    pieces, left, wanted = list[bytes](), most + 1, size + 1
     while left:
         pieces.append(file.read(wanted))
         if len(pieces[-1]) < wanted:
             return b"".join(pieces)
         left -= wanted
         wanted = min(_PIECE, left)
-    raise too_large(name, None, most)
+    raise too_large(name, None, most)  # it has grown, or does not say its size
 
 
 def most_unpacked(packed: int) -> int:
@@ -106,17 +103,6 @@ def as_utf8(data: bytes, name: str) -> bytes:
         return data.decode("utf-16").encode()
     except UnicodeError as error:
         raise InputError(f"{name}: is damaged UTF-16; save it as UTF-8") from error
-
-
-def _limit_of(file: BinaryIO, most: int) -> tuple[int, int]:
-    """Return how much of an open file is read, and how much it says that it has, bytes."""
-    try:
-        status = os.fstat(file.fileno())
-    except (OSError, ValueError):  # no file of the system's
-        return most, 0
-    if stat.S_ISCHR(status.st_mode) and not os.isatty(file.fileno()):
-        return min(most, _OF_DEVICES), 0
-    return most, status.st_size if stat.S_ISREG(status.st_mode) else 0
 
 
 def in_words(size: int) -> str:

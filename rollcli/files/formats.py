@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError, about
 from rollcli.estimator.moments import usable_of
 from rollcli.files.codecs import arrays, pictures, png, tiff
-from rollcli.files.codecs.raw_map import Stored as Stored
-from rollcli.files.codecs.raw_map import require_map_shape
+from rollcli.files.codecs.arrays import Stored as Stored
 from rollcli.files.containers import is_archive, members
 from rollcli.files.naming import listed
 from rollcli.files.storage import read_bytes, read_frame
@@ -74,7 +73,7 @@ def read_stored(path: str | Path, name: str | None = None, *, rgb: bool = False)
     if isinstance(found, bytes):
         return decode_stored(found, name)
     with about(name):
-        require_map_shape(found.shape)  # of a recording
+        arrays.require_map_shape(found.shape)  # of a recording
     return Stored(found, "npy")
 
 

@@ -54,24 +54,19 @@ def find_inputs(
     """
     search = search or Search()
     found: list[Input] = []
-    seen: dict[str, set[str]] = {}  # names by their folders, whose texts they share
+    seen = set[tuple[str, str]]()  # the names of one folder share its text
     real = functools.cache(os.path.realpath)  # one folder holds thousands of files
     argument = ""
     for argument, literal in _arguments(inputs, files_from):
         before, repeats = len(found), False
         for path, relative in search.files(argument, literal=literal):
             # links to files stay themselves: each may be a frame
-            if is_url(path):
-                folder, base = "", path
-            else:
-                folder, base = os.path.split(shown(path))
-                folder = real(folder)
-            names = seen.setdefault(folder, set())
-            if base not in names:
-                names.add(base)
+            folder, base = ("", path) if is_url(path) else os.path.split(shown(path))
+            place = real(folder), base
+            repeats |= place in seen
+            if place not in seen:
+                seen.add(place)
                 found.append(Input(path, _shown(path), relative))
-            else:
-                repeats = True
         if repeats and len(found) == before and not literal:
             search.notes.append(f"{argument}: is named more than once; each of its files is taken once")
     if search.left_out:

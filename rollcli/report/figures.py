@@ -51,11 +51,6 @@ class Drawing:
     label: str
     draw: Callable[[Axes, float], None]
 
-    @property
-    def still(self) -> str:
-        """Its pictures for wide and for narrow screens, HTML."""
-        return stills(self)
-
 
 def chart_file(chart: Chart | Drawing, kind: str, size: Size = SLIDE) -> bytes:
     """Return a chart as a file on white: "svg", "pdf" or "png"."""

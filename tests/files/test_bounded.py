@@ -197,8 +197,7 @@ def test_small_files_need_no_room_for_the_largest_ones(tmp_path, inputs):
 def test_a_file_that_says_no_size_is_read_to_its_end_or_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(bounded, "_PIECE", 7)
     data = bytes(range(100))
-    assert bounded.read_up_to(io.BytesIO(data), "f", 0, 100) == data
-    assert bounded.read_up_to(io.BytesIO(data), "f", 100, 100) == data
-    assert bounded.read_up_to(io.BytesIO(b""), "f", 0, 100) == b""
+    assert bounded.read_stream(io.BytesIO(data), "f", 100) == data
+    assert bounded.read_stream(io.BytesIO(b""), "f", 100) == b""
     with pytest.raises(InputError, match="f: has more than 99 bytes"):
-        bounded.read_up_to(io.BytesIO(data), "f", 0, 99)
+        bounded.read_stream(io.BytesIO(data), "f", 99)

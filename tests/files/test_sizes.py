@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rollcli.errors import InputError
-from rollcli.files.codecs import raw_map
+from rollcli.files.codecs import arrays
 from rollcli.files.formats import decode_image, decode_stored
 from tests.binary_files import make_npy, make_png, make_tiff, png_file, png_header, tiff_of_bits
 from tests.run_cli import command, environment
@@ -113,13 +113,13 @@ COUNTED = {
 def test_a_file_is_read_up_to_the_limit_and_no_further(monkeypatch, name):
     decode, make, pixel_bytes = COUNTED[name]
     data, needed = make(), 13 * 7 * pixel_bytes
-    monkeypatch.setattr(raw_map, "MOST_SMALL", 0)
+    monkeypatch.setattr(arrays, "MOST_SMALL", 0)
 
-    monkeypatch.setattr(raw_map, "_MOST", needed)
-    monkeypatch.setattr(raw_map, "MOST_EXPANSION", 2 * needed)
+    monkeypatch.setattr(arrays, "_MOST", needed)
+    monkeypatch.setattr(arrays, "MOST_EXPANSION", 2 * needed)
     found = decode(data, "x")
     assert (found.values if decode is decode_stored else found).shape[:2] == (7, 13)
-    monkeypatch.setattr(raw_map, "_MOST", needed - 1)
+    monkeypatch.setattr(arrays, "_MOST", needed - 1)
     with pytest.raises(
         InputError, match=r"^x: its header claims 13 x 7 pixels, 1 MB once decoded; from \d+ bytes up"
     ):
@@ -129,7 +129,7 @@ def test_a_file_is_read_up_to_the_limit_and_no_further(monkeypatch, name):
 def claim(width, height, pixel_bytes, stored, *, mask=False):
     """What is said of a claim; empty where it is believed."""
     try:
-        raw_map.require_decoded_fits(width, height, pixel_bytes, stored, mask=mask)
+        arrays.require_decoded_fits(width, height, pixel_bytes, stored, mask=mask)
     except InputError as error:
         return str(error)
     return ""

@@ -12,7 +12,7 @@ from rollcli.rig.calibration import Calibration, CalibrationOptions
 from rollcli.rig.drive.assess import assess_rig, split_drives
 from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.drive.quantity import assess_sequence
-from rollcli.rig.formats.yaml import parse_yaml
+from rollcli.rig.formats.fields import File, parse_yaml
 from rollcli.rig.pose import horizon_row, taken_as_exact, with_pose
 from rollcli.rig.quantities import ALIGNMENT, HEIGHT, PITCH, ROLL
 from rollcli.rig.read_calibration import parse_calibration
@@ -294,7 +294,7 @@ CASES = {
         for value in values
     ],
     "files: damaged": lambda: [_read(text) for text in DAMAGED],
-    "files: YAML": lambda: [made(parse_yaml, text, "f") for text in YAMLS],
+    "files: YAML": lambda: [made(parse_yaml, File("f", text)) for text in YAMLS],
     "no rows": lambda: [made(assess_rig, rows) for rows in NO_ROWS],
     **{
         f"drives: {groups}": partial(_split, groups)

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError, OutputError
 from rollcli.files.codecs import png
+from rollcli.files.codecs.arrays import Stored, native, require_decoded_fits
 from rollcli.files.codecs.png import PICTURE_FLAGS, decoded_by_opencv
-from rollcli.files.codecs.raw_map import Stored, native, require_decoded_fits
 
 _BMP = b"BM"
 LOSSLESS = (_BMP, b"P5", b"P6")

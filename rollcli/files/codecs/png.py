@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
-from rollcli.files.codecs.raw_map import COLOUR_REMEDY, Stored, require_decoded_fits
+from rollcli.files.codecs.arrays import COLOUR_REMEDY, Stored, require_decoded_fits
 
 # a camera image as it lies in the file, grey or BGR: turning it by its EXIF tag would break rectification
 PICTURE_FLAGS = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError
+from rollcli.files.codecs.arrays import COLOUR_REMEDY, Stored, native, require_decoded_fits
 from rollcli.files.codecs.png import decoded_by_opencv, decoding
-from rollcli.files.codecs.raw_map import COLOUR_REMEDY, Stored, native, require_decoded_fits
 
 _NONE, _LZW, _DEFLATE, _OLD_DEFLATE, _PACKBITS = 1, 5, 8, 32946, 32773
 # how many bytes one byte can stand for

@@ -14,7 +14,7 @@ from rollcli.errors import InputError
 from rollcli.extras import require_extra
 from rollcli.files.bounded import MOST_BYTES
 from rollcli.files.codecs import pictures, png
-from rollcli.files.codecs.raw_map import require_decoded_fits
+from rollcli.files.codecs.arrays import require_decoded_fits
 from rollcli.files.recordings.bags import Topic
 
 DISPARITY = "stereo_msgs/DisparityImage"

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError, about, as_usage
 from rollcli.files.bounded import state_of
+from rollcli.files.codecs.arrays import require_decoded_fits
 from rollcli.files.codecs.pictures import half_size
-from rollcli.files.codecs.raw_map import require_decoded_fits
 from rollcli.files.naming import Input, gathered
 from rollcli.files.stores.locations import require_local
 

@@ -2,12 +2,14 @@
 
 import json
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple, Union
 
 from rollcli.errors import InputError
-from rollcli.rig.formats.yaml import Value, parse_yaml
+
+Value = Union[str, list["Value"], dict[str, "Value"]]  # noqa: UP007 - the alias names itself
 
 _LONGEST = 40  # characters of a number: no calibration has more digits
 _SAME_FOCAL = 1e-3  # relative: the views of a rectified pair have one focal length
@@ -65,10 +67,6 @@ class File(NamedTuple):
             key, found, value = line.partition(sign)
             if found:
                 yield key.strip(), value.strip()
-
-    def yaml(self) -> dict[str, Value]:
-        """Return the values of a YAML document; see `parse_yaml`."""
-        return parse_yaml(self.text, self.name)
 
     def json(self) -> dict[str, Value]:
         """Return the values of a JSON object, numbers as text."""
@@ -161,6 +159,72 @@ class File(NamedTuple):
     def swapped(self) -> InputError:
         """Return the error for a right camera that stands left of the left one."""
         return self.error("is contradictory: its right camera stands left of its left one; are they swapped?")
+
+
+_MOST = 1 << 17  # characters, which PyYAML parses in a second; real calibrations have a few thousand
+_MATRIX = "tag:yaml.org,2002:opencv-"
+# OpenCV's first line is no directive of YAML, and its files may lack the space after a key's colon
+_DIRECTIVE = re.compile(r"^%YAML.*", re.MULTILINE)
+_TIGHT_KEY = re.compile(r"^( *[\w.]+):(?=\S)", re.MULTILINE)
+# PyYAML refuses tabs where other readers do not: anywhere but in the indentation
+_INNER_TABS = re.compile(r"(?<=\S)[ \t]*\t[ \t]*|^[ \t]+$", re.MULTILINE)
+
+
+def parse_yaml(file: File) -> dict[str, Value]:
+    """Return the values of a YAML document whose top level is a mapping: mappings, sequences and text.
+
+    ROS, Kalibr, ORB-SLAM and OpenCV write it; PyYAML parses it. What they have no use for is refused as soon
+    as the parser meets it: anchors and aliases, which can make a few lines fill the memory, and tags, which
+    name objects. What follows the end of the first document is left alone; numbers stay the text they are.
+
+    Raises
+    ------
+    InputError
+        The text is no YAML, or has what calibration files have no use for; the line is named.
+    """
+    text = file.text
+    if len(text) > _MOST:
+        raise file.error(f"has {len(text)} characters; no calibration in YAML has more than {_MOST}")
+    import yaml  # takes 25 ms, and most calibrations are no YAML
+
+    class Loader(yaml.BaseLoader):
+        """Build text, lists and mappings, but nothing that an anchor, an alias or a tag asks for."""
+
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            event = self.peek_event()  # type: ignore[no-untyped-call]
+            tag = getattr(event, "tag", None)
+            if event.anchor is not None or not (tag or _MATRIX).startswith(_MATRIX):
+                what = f"tag {tag}" if event.anchor is None else f"anchor or alias {event.anchor}"
+                line = event.start_mark.line + 1
+                raise file.error(f"line {line} has the {what}, which calibrations have no use for")
+            return super().compose_node(parent, index)
+
+        def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+            found = super().construct_mapping(node, deep)
+            seen = set[str]()
+            for key, _ in node.value:
+                if key.value in seen:
+                    raise file.error(f"line {key.start_mark.line + 1} gives {key.value} a second time")
+                seen.add(key.value)
+            return found
+
+    if "%YAML:" in text:
+        text = _TIGHT_KEY.sub(r"\1: ", text)
+    text = _INNER_TABS.sub(" ", _DIRECTIVE.sub("", text, count=1))
+    try:
+        values = Loader(text).get_data()
+    except yaml.MarkedYAMLError as error:
+        why = " ".join(filter(None, (error.context, error.problem)))
+        why += ": the file is cut off" if "<stream end>" in why or "end of stream" in why else ""
+        mark = error.problem_mark or error.context_mark
+        raise file.error(f"line {mark.line + 1 if mark else 1} is no YAML: {why}") from error
+    except yaml.YAMLError as error:
+        raise file.error(f"is no YAML: {' '.join(str(error).split())}") from error
+    except RecursionError as error:
+        raise file.error("nests deeper than a calibration does") from error
+    if not isinstance(values, dict):
+        raise file.error("holds no value that has a name")
+    return values
 
 
 def has_key(sign: str, *keys: str) -> Callable[[File], bool]:

@@ -11,8 +11,7 @@ from dataclasses import replace
 from xml.etree import ElementTree
 
 from rollcli.rig.calibration import LIKELY_BASELINE
-from rollcli.rig.formats.fields import Fields, File
-from rollcli.rig.formats.yaml import Value
+from rollcli.rig.formats.fields import Fields, File, Value, parse_yaml
 
 _KEYS = re.compile(r"""(?:^|[\s<{,"])(?:P1|P2|Q|M1)(?:"?\s*:|[\s>])""")
 _MARKS = ("%YAML:1.0", "%YAML 1.0", "<opencv_storage>", "opencv-matrix")
@@ -67,7 +66,7 @@ def _matrices(file: File) -> dict[str, Value]:
     elif start == "{":
         values = file.json()
     else:
-        values = file.yaml()
+        values = parse_yaml(file)
     found = {}
     for key in ("P1", "P2", "Q"):
         value = values.get(key)

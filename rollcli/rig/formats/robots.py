@@ -11,7 +11,7 @@ alone: rectification chooses focal length and principal point anew, and neither 
 import math
 from dataclasses import replace
 
-from rollcli.rig.formats.fields import Fields, File, Projection
+from rollcli.rig.formats.fields import Fields, File, Projection, parse_yaml
 
 _MM = 1e-3
 _RAW = "is of the raw images, and gives the baseline alone"
@@ -43,7 +43,7 @@ def read_ros(first: File, second: File | None = None) -> Fields:
 
 
 def _view(file: File) -> tuple[Projection, tuple[int | None, int | None]]:
-    values = file.yaml()
+    values = parse_yaml(file)
     matrix = values.get("projection_matrix", "")
     if not matrix:
         raise file.error("has no projection_matrix, or not at its top level")
@@ -54,7 +54,7 @@ def _view(file: File) -> tuple[Projection, tuple[int | None, int | None]]:
 
 def read_orb_slam(file: File) -> Fields:
     """Read the camera and the baseline."""
-    values = file.yaml()
+    values = parse_yaml(file)
 
     def read(*keys: str) -> float:
         for key in keys:
@@ -71,7 +71,7 @@ def read_orb_slam(file: File) -> Fields:
 
 def read_kalibr(file: File) -> Fields:
     """Read the distance between cam0 and cam1, metres: the last column of T_cn_cnm1."""
-    camera = file.yaml().get("cam1")
+    camera = parse_yaml(file).get("cam1")
     rows = camera.get("T_cn_cnm1") if isinstance(camera, dict) else None
     what = "T_cn_cnm1 of cam1"
     matrix = [file.numbers(row, what) for row in rows] if isinstance(rows, list) else []
