@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import rollcli as package
-from rollcli.files.codecs.raw_map import Stored
+from rollcli.files.codecs.arrays import Stored
 from rollcli.files.results import ALIGNMENT_COLUMNS
 from rollcli.rig.calibration import Calibration
 from rollcli.run.read import Source, _carried
