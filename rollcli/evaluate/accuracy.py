@@ -341,7 +341,7 @@ def run_accuracy(options: AccuracyOptions) -> ExitStatus:
     """
     result, truth, running = options.result, options.truth, options.running
     writes = [] if is_stream(options.output) else [options.output]
-    if listed_only([([result, truth], writes)], running):
+    if listed_only(lambda: [([result, truth], writes)], running):
         return ExitStatus.DONE
     read, known = read_result(result), read_truth(truth)
     found = replace(assess(read.rows, known, result), heights=_heights(read, known, options))

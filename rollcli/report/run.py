@@ -76,7 +76,7 @@ def run_report(options: ReportOptions) -> ExitStatus:
     page = [] if options.output is None or is_stream(options.output) else [options.output]
     charts = all_charts(rows, rig)
     writes = [*(path for name in charts for path in options.chart_paths(name).values()), *page]
-    if listed_only([([*options.results, *reads], writes)], options.running):
+    if listed_only(lambda: [([*options.results, *reads], writes)], options.running):
         return ExitStatus.DONE
     if missing := unfinished(parts):
         options.running.note(missing)

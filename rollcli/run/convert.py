@@ -6,6 +6,7 @@ Where they are given a result, each map has its row there.
 import math
 from collections.abc import Callable, Sequence
 from contextlib import closing
+from functools import partial
 
 from rollcli.errors import ExitStatus, RollcliError, UsageError
 from rollcli.extras import require_extra
@@ -42,8 +43,8 @@ def run_conversion(options: ConvertOptions) -> ExitStatus:
     """
     running = options.running
     frames = _plan(options)
-    files = ((each.reads(), outputs.every_path(each, options.writes)) for each in frames)
-    if outputs.listed_only(files, running):
+    paths_of = partial(outputs.every_path, writes=options.writes)
+    if outputs.listed_only(lambda: ((each.reads(), paths_of(each)) for each in frames), running):
         return ExitStatus.DONE
     require_scheduler(running.scheduler)
     progress = Progress(len(frames), options, statuses=("ok",))

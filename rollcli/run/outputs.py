@@ -188,13 +188,15 @@ def check_named_once(names: Sequence[str]) -> None:
         raise UsageError(f"{twice[0]}: is named twice")
 
 
-def listed_only(files: Iterable[tuple[Iterable[str], Iterable[str]]], running: RunningOptions) -> bool:
+def listed_only(
+    files: Callable[[], Iterable[tuple[Iterable[str], Iterable[str]]]], running: RunningOptions
+) -> bool:
     """Check what would be read and written, and list it where that is all that was asked.
 
     Parameters
     ----------
-    files : iterable of (reads, writes)
-        What is read and written, in parts.
+    files : callable
+        Begins to yield anew what is read and what is written, in parts; a list of all may be too long.
     running : RunningOptions
 
     Returns
@@ -207,13 +209,12 @@ def listed_only(files: Iterable[tuple[Iterable[str], Iterable[str]]], running: R
     UsageError
         Names an input that would be written, or without --overwrite an output that exists.
     """
-    every = [(list(reads), list(writes)) for reads, writes in files]
-    written = [path for _, writes in every for path in writes]
-    check_inputs_are_kept(lambda: chain.from_iterable(reads for reads, _ in every), written)
+    written = [path for _, writes in files() for path in writes]
+    check_inputs_are_kept(lambda: chain.from_iterable(reads for reads, _ in files()), written)
     if not running.overwrite:
         check_nothing_is_there(written)
     if running.dry_run:
-        list_files(every)
+        list_files(files())
     return running.dry_run
 
 

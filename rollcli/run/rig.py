@@ -231,7 +231,7 @@ def run_rig(options: RigOptions) -> int:
     if options.output == options.correction == STREAM:
         raise UsageError("--correction and the answer cannot both go to stdout: name a file for one of them")
     check_options(options.gates)
-    if listed_only([(reads, writes)], options.running):
+    if listed_only(lambda: [(reads, writes)], options.running):
         return 0
     rig, missing, notes = _assessed(options.results, options)
     after, changes = None, dict[str, Estimate]()
