@@ -93,6 +93,8 @@ def _source(subject: Subject) -> Source:
     if "disparity" in subject.images:
         of_map = frame._replace(path=subject.images["disparity"], right_path="", right_file="", mask=None)
         source = read_source(of_map, FrameOptions())
+        if source.size is not None:
+            return source
         height, width = source.disparity.shape
         downscale = options.stereo.downscale if frame.right_file else 1.0
         return replace(source, size=(round(width * downscale), round(height * downscale)))

@@ -243,8 +243,8 @@ def _read(frame: Frame, options: FrameOptions) -> Source:
     found = to_disparity(stored, **given._asdict(), calibration=frame.calibration)
     encoding = found.encoding.value
     beyond = {"beyond": too_large(found.disparity, stored, encoding)}
-    source = Source(found.disparity, stored=stored, encoding=encoding, warnings={**found.warnings, **beyond})
-    source = replace(source, **_carried(stored))
+    warnings = {**found.warnings, **beyond}
+    source = Source(found.disparity, stored=stored, encoding=encoding, warnings=warnings, **_carried(stored))
     # the roll is the same at any scale, pitch and height are not
     return source if frame.calibration is None else replace(source, doubts={**source.doubts, **beyond})
 
@@ -265,7 +265,7 @@ def _carried(stored: Stored) -> dict[str, Any]:
         error, doubt, lay = float(carried["slope_error"]), carried["doubt"], carried["alignment"]
         alignment = {name: float(lay[name]) for name in ALIGNMENT_COLUMNS if name in lay}
         larger, clockwise = map(float, carried.get("levelled", (0.0, 0.0)))  # earlier files have none
-        width, height = map(int, carried.get("size", reversed(stored.values.shape)))
+        width, height = map(int, carried.get("size", (0, 0)))  # where it is not the map's own
         # else the map was turned with --expand: its sides are not those of the images, but for one factor
         same_view = min(width, height) > 0 and one_factor(stored.values.shape[::-1], (width, height))
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError):

@@ -198,6 +198,10 @@ def test_a_file_that_says_no_size_is_read_to_its_end_or_refused(tmp_path, monkey
     monkeypatch.setattr(bounded, "_PIECE", 7)
     data = bytes(range(100))
     assert bounded.read_stream(io.BytesIO(data), "f", 100) == data
+    with (tmp_path / "f").open("w+b") as file:  # this one says it
+        file.write(data)
+        file.seek(0)
+        assert bounded.read_stream(file, "f", 100) == data
     assert bounded.read_stream(io.BytesIO(b""), "f", 100) == b""
     with pytest.raises(InputError, match="f: has more than 99 bytes"):
         bounded.read_stream(io.BytesIO(data), "f", 99)
