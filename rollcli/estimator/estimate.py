@@ -14,13 +14,6 @@ from rollcli.estimator.road.model import Parabola
 from rollcli.estimator.road.pixels import PixelSet, select_pixels
 from rollcli.estimator.solvers.exact import CertifiedSolution, certify
 
-# what a row of a result says of an estimate, in order: before and after the parabola and how well it fits
-_FIRST = (
-    *("status", "roll_deg", "roll_ci95_deg", "pitch_deg", "pitch_ci95_deg", "height_m", "height_ci95_m"),
-    *("camber", "method", "iterations", "converged", "global_minimum"),
-)
-_LAST = ("valid_fraction", "road_fraction", "width", "height", "message", "image_roll_deg")
-
 
 @dataclass(frozen=True)
 class RollEstimate:
@@ -120,9 +113,31 @@ class RollEstimate:
         dict
             As JSON can write it; `assess_rig` takes a list of these.
         """
-        first, last = ({name: getattr(self, name) for name in names} for names in (_FIRST, _LAST))
-        alphas = {f"alpha{power}": each for power, each in enumerate(self.alpha)}
-        return {**first, "rmse_px": self.rmse, **alphas, **last}
+        alpha0, alpha1, alpha2 = self.alpha
+        return {
+            "status": self.status,
+            "roll_deg": self.roll_deg,
+            "roll_ci95_deg": self.roll_ci95_deg,
+            "pitch_deg": self.pitch_deg,
+            "pitch_ci95_deg": self.pitch_ci95_deg,
+            "height_m": self.height_m,
+            "height_ci95_m": self.height_ci95_m,
+            "camber": self.camber,
+            "method": self.method,
+            "iterations": self.iterations,
+            "converged": self.converged,
+            "global_minimum": self.global_minimum,
+            "rmse_px": self.rmse,
+            "alpha0": alpha0,
+            "alpha1": alpha1,
+            "alpha2": alpha2,
+            "valid_fraction": self.valid_fraction,
+            "road_fraction": self.road_fraction,
+            "width": self.width,
+            "height": self.height,
+            "message": self.message,
+            "image_roll_deg": self.image_roll_deg,
+        }
 
 
 def _degrees(angle: float | None) -> float | None:

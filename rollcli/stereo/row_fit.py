@@ -8,7 +8,7 @@ of the field is even. How well each of them explains the blocks decides what the
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from itertools import product
 from typing import NamedTuple
 
@@ -142,20 +142,20 @@ class ColumnEvidence:
 
         Noise is each pair's own; what the lens leaves is shared by all.
         """
-        all_of = {
-            each.name: np.array([getattr(pair, each.name) for pair in pairs]) for each in fields(pairs[0])
-        }
-        sure, sures = 1 / all_of["twist_variance"], 1 / all_of["shape_variances"]
-        return replace(
-            pairs[0],
-            **{name: all_of[name].sum(axis=0) for name in ("information", "told")},
-            **{
-                name: all_of[name].mean(axis=0)
-                for name in ("offset", "unevenness", "shape_variances", "reach")
-            },
-            twist=np.average(all_of["twist"], weights=sure),
-            twist_variance=1 / sure.sum(),
-            shapes=np.average(all_of["shapes"], axis=0, weights=sures),
+        sure = 1 / np.array([each.twist_variance for each in pairs])
+        sures = 1 / np.array([each.shape_variances for each in pairs])
+        return ColumnEvidence(
+            information=np.sum([each.information for each in pairs], axis=0),
+            told=np.sum([each.told for each in pairs], axis=0),
+            offset=float(np.mean([each.offset for each in pairs])),
+            twist=float(np.average([each.twist for each in pairs], weights=sure)),
+            twist_variance=float(1 / sure.sum()),
+            unevenness=float(np.mean([each.unevenness for each in pairs])),
+            shapes=np.average([each.shapes for each in pairs], axis=0, weights=sures),
+            shape_variances=np.mean([each.shape_variances for each in pairs], axis=0),
+            reach=np.mean([each.reach for each in pairs], axis=0),
+            shape=pairs[0].shape,
+            factor=pairs[0].factor,
         )
 
 

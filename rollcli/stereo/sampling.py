@@ -1,6 +1,6 @@
 """Grey levels of views between their pixels, and in blocks; where a right view shows a level one's points."""
 
-from typing import Any, TypeVar
+from typing import Any
 
 import cv2
 import numpy as np
@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 
 from rollcli.estimator.moments import Bools, Singles
 from rollcli.stereo.misalignment import LEVEL, Misalignment
-from rollcli.stereo.views import Map, View, resized
-
-_Number = TypeVar("_Number", np.float32, np.uint8)
+from rollcli.stereo.views import Map, Number, View, resized
 
 BLOCK = 8  # px: the side of what gets one shift where the grey levels of both views are compared
 
@@ -37,7 +35,7 @@ def block_means(pixels: Singles) -> Singles:
     return resized(whole, (width, height), cv2.INTER_AREA)
 
 
-def blocks_at(pixels: NDArray[_Number], places: Bools) -> NDArray[_Number]:
+def blocks_at(pixels: NDArray[Number], places: Bools) -> NDArray[Number]:
     """Return the pixels of some of the blocks of an image, shape (blocks, BLOCK ** 2)."""
     height, width = (side // BLOCK for side in pixels.shape)
     blocks = pixels[: height * BLOCK, : width * BLOCK].reshape(height, BLOCK, width, BLOCK)
@@ -47,7 +45,7 @@ def blocks_at(pixels: NDArray[_Number], places: Bools) -> NDArray[_Number]:
 _SMOOTH = np.array([1, 6, 1], np.float32) / 8  # what `cv2.pyrUp` does at a view's own pixels
 
 
-def smoothed_between(view: NDArray[_Number]) -> NDArray[_Number]:
+def smoothed_between(view: NDArray[Number]) -> NDArray[Number]:
     """Return a view twice as large and a little smoother, for `grey_between`.
 
     Grey levels that are interpolated between pixels lie off by where between them: linearly by up to 0.08 px,
@@ -66,9 +64,7 @@ def smoothed_at_pixels(view: View) -> View:
     return _as_stored(smoothed(view), view)
 
 
-def grey_between(
-    twice: NDArray[_Number], u: Singles, v: Singles
-) -> tuple[Singles, Singles, NDArray[_Number]]:
+def grey_between(twice: NDArray[Number], u: Singles, v: Singles) -> tuple[Singles, Singles, NDArray[Number]]:
     """Return points (u, v) to 1/64 px, and the grey levels there of a view that is `smoothed_between`.
 
     The border repeats.
@@ -101,7 +97,7 @@ def rounded(points: Singles, parts: int) -> Singles:
     return points + to_parts - to_parts
 
 
-def sampled(view: NDArray[_Number], u: Singles, v: Singles, between: int) -> NDArray[_Number]:
+def sampled(view: NDArray[Number], u: Singles, v: Singles, between: int) -> NDArray[Number]:
     """Return the grey levels at points (u, v) of a view, interpolated as `between`; the border repeats.
 
     OpenCV 4 rounds points to 1/32 px, and OpenCV 5 does not: angles of 41 real pairs differed by up to 0.07
@@ -110,13 +106,13 @@ def sampled(view: NDArray[_Number], u: Singles, v: Singles, between: int) -> NDA
     return _remapped(view, rounded(u, 32), rounded(v, 32), between)
 
 
-def _remapped(view: NDArray[_Number], u: Singles, v: Singles, between: int) -> NDArray[_Number]:
+def _remapped(view: NDArray[Number], u: Singles, v: Singles, between: int) -> NDArray[Number]:
     """Return the grey levels at points that are rounded, see `sampled`."""
     grey = view.astype(np.float32, copy=False)
     return _as_stored(cv2.remap(grey, u, v, between, borderMode=cv2.BORDER_REPLICATE), view)
 
 
-def _as_stored(grey: NDArray[Any], like: NDArray[_Number]) -> NDArray[_Number]:
+def _as_stored(grey: NDArray[Any], like: NDArray[Number]) -> NDArray[Number]:
     """Return grey levels that were computed as float32 in the type of the view that they are of."""
     if like.dtype == np.uint8:
         grey = cv2.convertScaleAbs(np.maximum(grey, 0), beta=_HALF_UP)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError
 from rollcli.estimator.moments import Bools, Singles
 
-_Number = TypeVar("_Number", np.float32, np.uint8)
+Number = TypeVar("Number", np.float32, np.uint8)
 
 View = NDArray[np.uint8]
 """Shape (H, W)."""
@@ -258,7 +258,7 @@ def _third(view: View, factor: float) -> View:
     return resized(means, (width, height), cv2.INTER_LINEAR_EXACT)
 
 
-def resized(pixels: NDArray[_Number], size: tuple[int, int], how: int) -> NDArray[_Number]:
+def resized(pixels: NDArray[Number], size: tuple[int, int], how: int) -> NDArray[Number]:
     """Return an image at another size, width and height, as OpenCV interpolates it."""
     return cv2.resize(pixels, size, interpolation=how).astype(pixels.dtype, copy=False)
 
