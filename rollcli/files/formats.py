@@ -163,7 +163,9 @@ def decode_image(data: bytes, name: str) -> NDArray[Any]:
 
 
 def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:
-    """Decode a mask, from a map or a lossless picture: True where any colour is non-zero; shape (H, W).
+    """Decode a mask, from a map or a lossless picture: True where a pixel may be used; shape (H, W).
+
+    It has a colour that is not zero, and in a PNG is not fully transparent.
 
     Raises
     ------
@@ -172,7 +174,7 @@ def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:
     """
     with about(name):
         if data.startswith(png.SIGNATURE):
-            pixels = png.picture(data, mask=True)
+            pixels = png.decode_mask(data)
         elif data.startswith(pictures.LOSSLESS):
             pixels = pictures.decode_picture(data)
         elif data.startswith(pictures.SIGNATURES):

@@ -2,6 +2,7 @@
 
 import zipfile
 
+import cv2
 import numpy as np
 import pytest
 
@@ -71,3 +72,11 @@ def test_what_is_no_number_in_a_mask_is_not_used(tmp_path):
     found = region_mask(str(tmp_path / "mask.npy"), FrameOptions(), SHAPE)
     np.testing.assert_array_equal(found, V > 30)
     np.testing.assert_array_equal(usable_of(values), V > 30)
+
+
+@pytest.mark.parametrize("depth", [np.uint8, np.uint16])
+def test_transparent_pixels_of_a_mask_are_not_used(tmp_path, depth):
+    shown = np.where(V > 60, np.iinfo(depth).max, 0).astype(depth)
+    cv2.imwrite(str(tmp_path / "mask.png"), np.dstack([np.full((*SHAPE, 3), 255, depth), shown]))
+    found = region_mask(str(tmp_path / "mask.png"), FrameOptions(), SHAPE)
+    np.testing.assert_array_equal(found, V > 60)

@@ -201,9 +201,16 @@ def decode_png(data: bytes) -> Stored:
     return Stored(pixels, "png", text=bodies.get(_TEXT_KEY, b"").decode("latin-1"))
 
 
-def picture(data: bytes, *, mask: bool = False) -> NDArray[Any]:
-    """Return the pixels of a camera image or mask: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
-    return _decoded(data, PICTURE_FLAGS, mask=mask)[-1]
+def picture(data: bytes) -> NDArray[Any]:
+    """Return the pixels of a camera image: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
+    return _decoded(data, PICTURE_FLAGS)[-1]
+
+
+def decode_mask(data: bytes) -> NDArray[Any]:
+    """Return the pixels of a mask: grey (H, W) or BGR (H, W, 3), 0 where they are fully transparent."""
+    pixels = _decoded(data, cv2.IMREAD_UNCHANGED, mask=True)[-1]
+    has_alpha = pixels.ndim == 3 and pixels.shape[2] == 4
+    return np.where(pixels[..., 3:] > 0, pixels[..., :3], 0) if has_alpha else pixels
 
 
 def encode_png(values: NDArray[Any], text: str = "") -> bytes:
