@@ -564,7 +564,11 @@ def _differences(kept: KeptRows, was: Mapping[str, Any] | None, record: RunRecor
         yield f"the names of the inputs differ{hint}"
     if kept.changed:
         how = "" if plan.options.result.in_parts else "; --update does again what has changed"
-        yield f"{kept.changed[0]} has changed since{how}"
+        if {frames[at].file for at in kept.errors}.issuperset(kept.changed):
+            how = "; --retry-failed does again what has failed"
+        also = {"right image": plan.options.paired, "mask": plan.options.region.mask}
+        read = [kept.changed[0], *(f"its {each}" for each, given in also.items() if given)]
+        yield f"{' or '.join(read)} has changed since{how}"
 
 
 _LISTS = {"encoding": str, "disparities_searched_px": int}

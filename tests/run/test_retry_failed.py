@@ -78,6 +78,8 @@ def test_frames_whose_files_were_mended_end_in_the_bytes_of_a_run_without_failur
     line = ("estimate", "maps", "-o", result, "--derotated", "up", "--part-rows", "5")
     assert rollcli(*line, cwd=folder).status == 3
     mend(folder, maps, 2, 9)
+    said = rollcli(*line, "--resume", cwd=folder, status=2).err
+    assert "frame2.png has changed since; --retry-failed does again what has failed" in said
     once = rollcli(*line, *RETRY, cwd=folder)
     assert (once.status, "(9 kept): 11 ok, 0 suspect, 1 failed" in once.err) == (3, True), once.err
     before = {path: path.stat().st_ino for path in folder.glob("rolls.parquet/*")}
