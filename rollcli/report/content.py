@@ -19,7 +19,7 @@ from rollcli.report.pictures import Pictures
 from rollcli.rig import words
 from rollcli.rig.drive.assess import RigAssessment
 from rollcli.rig.quantities import QUANTITIES
-from rollcli.run.resume import recorded_calibrations, recorded_options
+from rollcli.run.resume import recorded_calibrations, recorded_downscale
 from rollcli.run.rig_gates import NOT_SEEN, Health, health_of
 
 
@@ -66,7 +66,7 @@ def report_page(
 
 def _health(rig: RigAssessment, run: Mapping[str, Any]) -> Health | None:
     calibration = next(iter(recorded_calibrations(run)), None)
-    downscale = recorded_options(run, "the result's record").stereo.downscale
+    downscale = recorded_downscale(run, "the result's record")
     try:
         return health_of(rig, calibration, downscale)
     except UsageError:  # where frames have their own, the first may be of another size than the last drive

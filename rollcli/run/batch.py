@@ -247,8 +247,9 @@ def join_results(frames: Span[Frame], results: Sequence[FrameResult], options: B
         results = results[: figures.first_error + 1]
         figures = Figures.of([result.row for result in results])
     read_as = ReadAs()
-    for encoding, searched in {(result.encoding, result.searched) for result in results}:
-        read_as = read_as.joined(ReadAs(frozenset(filter(None, [encoding])), searched))
+    kinds = {(each.encoding, each.searched, each.downscale) for each in results}
+    for encoding, searched, downscale in kinds:
+        read_as = read_as.joined(ReadAs(frozenset(filter(None, [encoding])), searched, downscale))
     # those of Parquet are JSON until a part is full
     lines = [format_row(result.row, options.result.form, options.further) for result in results]
     known: ReadAs = frames.told

@@ -86,15 +86,17 @@ class Decoded(NamedTuple):
 
 
 class ReadAs(NamedTuple):
-    """How frames were read: the encodings, and the first and last disparity searched, px."""
+    """How frames were read: the encodings, the first and last disparity searched, px, and `downscale`."""
 
     encodings: frozenset[str] = frozenset()
     searched: tuple[int, int] | None = None
+    downscale: float = 1.0
 
     def joined(self, other: "ReadAs") -> "ReadAs":
         """Return how these and other frames were read."""
         ends = [*(self.searched or ()), *(other.searched or ())]
-        return ReadAs(self.encodings | other.encodings, (min(ends), max(ends)) if ends else None)
+        searched, downscale = (min(ends), max(ends)) if ends else None, max(self.downscale, other.downscale)
+        return ReadAs(self.encodings | other.encodings, searched, downscale)
 
 
 @dataclass(frozen=True)
@@ -110,6 +112,8 @@ class FrameResult:
         Why that may be wrong, and what else the user should know; by code, those that are empty left out.
     searched : tuple of int, or None
         First and last disparity searched, px; pairs only.
+    downscale : float
+        By how much wider than the map the images are that it was matched from.
     inputs : bytes
         What the frame was read from, where workers were told to note it: see `result_file.inputs_line`.
     cause : str
@@ -122,6 +126,7 @@ class FrameResult:
     encoding: str = ""
     warnings: Mapping[str, str] = field(default_factory=dict)
     searched: tuple[int, int] | None = None
+    downscale: float = 1.0
     inputs: bytes = b""
     cause: str = ""
     said: str = ""

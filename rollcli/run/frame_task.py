@@ -60,7 +60,8 @@ def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
         make = _estimated if options.convert is None else _converted
         row, made, warnings = make(frame, source, options)
         files.update(made)  # last: a frame that fails has none
-        return FrameResult(row, source.encoding, warnings, source.searched)
+        downscale = 1.0 if source.size is None else source.size[0] / source.disparity.shape[1]
+        return FrameResult(row, source.encoding, warnings, source.searched, downscale)
 
     with noting(options.notes) as notes:
         result = guarded(frame, work)

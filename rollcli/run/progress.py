@@ -132,7 +132,7 @@ class RunSummary:
     def pose_note(self, calibration: Calibration | None, downscale: float) -> str:
         """Return what the intervals of pitch and height leave out; empty where no frame has a pitch.
 
-        Pairs were matched at 1/downscale of their size.
+        Maps were matched at 1/downscale of their images' size.
         """
         pitch, height, width = map(self._median, ("pitch_deg", "height_m", "width"))
         if calibration is None or pitch is None or width is None:

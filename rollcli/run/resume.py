@@ -64,6 +64,7 @@ CONVENTIONS = {
 }
 
 _REPLACES = "replaces_images"  # while a run with --overwrite is not over
+_MOST_SHRUNK = 1e3  # more than --downscale takes
 _NUMBERS = ("scale", "num_disparities", "vertical_offset")  # options that are None by default
 Options = TypeVar("Options", EncodingOptions, ImageOptions, MethodOptions, RegionOptions, StereoOptions)
 
@@ -97,8 +98,8 @@ class RunRecord:
 
     def continue_from(self, earlier: Mapping[str, Any]) -> None:
         """Take over what the interrupted run has recorded about its inputs."""
-        searched = earlier["disparities_searched_px"]
-        self.read_as = ReadAs(frozenset(earlier["encoding"]), tuple(searched) if searched else None)
+        encodings, searched = frozenset(earlier["encoding"]), tuple(earlier["disparities_searched_px"])
+        self.read_as = ReadAs(encodings, searched or None, recorded_downscale(earlier, self.plan.output))
         self.replaces |= earlier.get(_REPLACES) is True
 
     def saw(self, read_as: ReadAs) -> None:
@@ -124,6 +125,7 @@ class RunRecord:
             **self.fixed,
             "encoding": sorted(self.read_as.encodings),
             "disparities_searched_px": list(self.read_as.searched or ()),
+            **({"downscale": self.read_as.downscale} if self.read_as.downscale > 1 else {}),
             "alignment": summary and summary.alignment(),
             "conventions": CONVENTIONS,
             "counts": summary.totals if summary else {},
@@ -182,6 +184,12 @@ def recorded_calibrations(run: Mapping[str, Any] | None) -> list[Calibration]:
         return [Calibration(**each) for each in (run or {})["calibration"]["first"]]
     except (KeyError, TypeError, ValueError):
         return []
+
+
+def recorded_downscale(run: Mapping[str, Any] | None, name: str) -> float:
+    """Read back how much wider than maps their images were; earlier records have it of pairs alone."""
+    found = (run or {}).get("downscale", recorded_options(run, name).stereo.downscale)
+    return float(found) if isinstance(found, int | float) and 1 <= found < _MOST_SHRUNK else 1.0
 
 
 def is_replaceable_record(path: str) -> bool:

@@ -24,7 +24,7 @@ from rollcli.run.frame import Frame, frame_of_row
 from rollcli.run.options import FrameOptions, RegionOptions, RigOptions
 from rollcli.run.outputs import check_named_once, listed_only
 from rollcli.run.read import FRAME_ERRORS, read_source
-from rollcli.run.resume import recorded_options
+from rollcli.run.resume import recorded_downscale, recorded_options
 from rollcli.run.rig_gates import check_options, health_of, run_checks, status_of
 from rollcli.run.rig_text import FORMATS, NO_COLUMNS, Findings, correction_text, moves
 from rollcli.stereo.alignment import Measured
@@ -240,7 +240,8 @@ def run_rig(options: RigOptions) -> int:
         missing, notes = missing or later, [*notes, *more]
         changes = {each.name: difference(rig.now(each), after.now(each), each) for each in QUANTITIES}
     calibration = calibration_finder(options.calibration)(rig.frames.files[-1])
-    downscale = 1.0 if calibration is None else _recorded(options.results[-1]).stereo.downscale
+    last = options.results[-1]
+    downscale = recorded_downscale(results.read_run(last), results.run_path(last))
     health = health_of(rig, calibration, downscale)
     if calibration is not None and (health is None or calibration.baseline is None):
         lacks = "no pair was measured" if health is None else "it has no baseline"

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import shutil
 
 import cv2
@@ -85,19 +86,25 @@ def test_after_a_jump_the_correction_is_of_the_pairs_since(pairs):
 
 
 def test_the_error_of_depth_is_the_same_at_each_size_that_pairs_are_matched_at(pairs):
-    given = ("--left", "left", "--right", "off", "--downscale", "2", "--calib", "calib.txt", "-q")
-    assert rollcli("estimate", *given, "-o", "half.csv", cwd=pairs).status == 0
+    given = ("--left", "left", "--right", "off", "--downscale", "2")
+    assert rollcli("disparity", *given, "-o", "maps", "-q", cwd=pairs).status == 0
+    turns = []
+    for of, out in ((given, "half.csv"), (("maps",), "maps.csv")):
+        done = rollcli("estimate", *of, "--calib", "calib.txt", "-o", out, cwd=pairs)
+        turns.append(float(re.search(r"([\d.]+) per 0.1 px of disparity", done.err)[1]))
+    assert turns[1] == pytest.approx(turns[0], rel=0.02)
     sized = "cam0=[280 0 239.5; 0 280 179.5; 0 0 1]\nbaseline=540\nwidth=480\nheight=360\n"
     (pairs / "sized.txt").write_text(sized)
     errors = []
-    for result in ("off.csv", "half.csv"):
+    for result in ("off.csv", "half.csv", "maps.csv"):
         for calibration in ("sized.txt", "calib.txt"):
             asked = (result, "--calib", calibration, "--format", "json", "-q")
             found = json.loads(rollcli("rig", *asked, cwd=pairs).out)
             errors.append(found["alignment"]["depth_error_percent"]["10_m"])
-    assert errors == pytest.approx([errors[0]] * 4, rel=0.1)
-    assert rollcli("report", "half.csv", "-o", "half.html", "--gallery", "0", cwd=pairs).status == 0
-    assert f"{errors[-1]:.1f} % at 10 m" in (pairs / "half.html").read_text()
+    assert errors == pytest.approx([errors[0]] * 6, rel=0.1)
+    for each in ("half", "maps"):
+        assert rollcli("report", f"{each}.csv", "-o", f"{each}.html", "--gallery", "0", cwd=pairs).status == 0
+        assert f"{errors[-1]:.1f} % at 10 m" in (pairs / f"{each}.html").read_text()
 
 
 def test_with_a_correction_the_angles_are_those_of_the_untouched_pairs(pairs):
