@@ -413,7 +413,9 @@ def _in_bags(bags: _Bags, options: FramesOptions) -> Iterator[_Named]:
         known, given = bag.calibration, options.calibration
         options.running.note(*bag.notes, *([] if given.given else bag.uncalibrated))
         known = None if known is None or given.calib else with_numbers(known, given)
-        yield from ((*views, known) for views in bag.frames)
+        own = given._replace(doffs=0.0) if bag.has_doffs and given.doffs is None else given
+        of = calibration_finder(own) if given.calib else None
+        yield from ((*views, of(views[0].name) if of else known) for views in bag.frames)
 
 
 def _frame_maker(options: FramesOptions) -> Callable[..., Frame]:

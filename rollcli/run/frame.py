@@ -95,8 +95,8 @@ class ReadAs(NamedTuple):
     def joined(self, other: "ReadAs") -> "ReadAs":
         """Return how these and other frames were read."""
         ends = [*(self.searched or ()), *(other.searched or ())]
-        searched, downscale = (min(ends), max(ends)) if ends else None, max(self.downscale, other.downscale)
-        return ReadAs(self.encodings | other.encodings, searched, downscale)
+        names, larger = self.encodings | other.encodings, max(self.downscale, other.downscale)
+        return ReadAs(names, (min(ends), max(ends)) if ends else None, larger)
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,6 @@ CONVENTIONS = {
 }
 
 _REPLACES = "replaces_images"  # while a run with --overwrite is not over
-_MOST_SHRUNK = 1e3  # more than --downscale takes
 _NUMBERS = ("scale", "num_disparities", "vertical_offset")  # options that are None by default
 Options = TypeVar("Options", EncodingOptions, ImageOptions, MethodOptions, RegionOptions, StereoOptions)
 
@@ -189,7 +188,7 @@ def recorded_calibrations(run: Mapping[str, Any] | None) -> list[Calibration]:
 def recorded_downscale(run: Mapping[str, Any] | None, name: str) -> float:
     """Read back how much wider than maps their images were; earlier records have it of pairs alone."""
     found = (run or {}).get("downscale", recorded_options(run, name).stereo.downscale)
-    return float(found) if isinstance(found, int | float) and 1 <= found < _MOST_SHRUNK else 1.0
+    return float(found) if isinstance(found, int | float) and 1 <= found < 1e3 else 1.0
 
 
 def is_replaceable_record(path: str) -> bool:

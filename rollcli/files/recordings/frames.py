@@ -23,6 +23,7 @@ _VIEWS = (IMAGE, COMPRESSED)
 _RAW = "image_raw"
 _SIDES = ("left", "right")
 _NO_P = "no CameraInfo with a principal point (P): no pitch and no height without --calib"
+_NO_LEFT = "no CameraInfo of the left view, but with a negative Tx: no pitch and no height without --calib"
 
 
 @dataclass
@@ -35,6 +36,8 @@ class BagFrames:
         Maps, or left and right views.
     calibration : Calibration or None
         Of the rectified pair, by CameraInfo.
+    has_doffs : bool
+        Whether disparities are x_l - x_r - (cx_l - cx_r) already [stereo_msgs/DisparityImage].
     notes : list of str
         What the user should know, a line each.
     uncalibrated : list of str
@@ -43,6 +46,7 @@ class BagFrames:
 
     frames: list[tuple[Input, Input | None]] = field(default_factory=list)
     calibration: Calibration | None = None
+    has_doffs: bool = False
     notes: list[str] = field(default_factory=list)
     uncalibrated: list[str] = field(default_factory=list)
 
@@ -77,21 +81,22 @@ def maps_of_bag(files: Sequence[str], name: str, topic: str | None) -> BagFrames
     topics = _topics(files)
     chosen = topic or _only_map_topic(files, topics, name)
     found = _scan(files, [_known(topics, chosen, name)], topics)
-    bag = BagFrames([(each, None) for each in found.frames[chosen]])
+    has_doffs = topics[chosen].type == DISPARITY
+    bag = BagFrames([(each, None) for each in found.frames[chosen]], has_doffs=has_doffs)
     left, right = _cameras(found, chosen)
     stated = 0.0
-    for each in found.frames[chosen] if topics[chosen].type == DISPARITY else ():
+    for each in found.frames[chosen] if has_doffs else ():
         with contextlib.suppress(InputError):  # a damaged one says so in its row
             stated = messages.baseline_of(topics[chosen], _message(each.location))
             break
     if stated < 0 and right is None:
         bag.notes.append(f"{name}: {chosen} states a baseline T of {stated:g} m: taken as {-stated:g} m")
     bag.calibration = _calibration(left, right, abs(stated), f"CameraInfo of {name}")
-    if bag.calibration is not None and topics[chosen].type == DISPARITY:
-        # its disparities are x_l - x_r - (cx_l - cx_r) already [stereo_msgs/DisparityImage]
+    if bag.calibration is not None and has_doffs:
         bag.calibration = replace(bag.calibration, doffs=0.0)
-    if bag.calibration is None and (found.cameras or topics[chosen].type == DISPARITY):
-        bag.uncalibrated.append(f"{name}: {_NO_P}")
+    if bag.calibration is None and (found.cameras or has_doffs):
+        lacks = _NO_LEFT if any(each.usable for each in found.cameras.values()) else _NO_P
+        bag.uncalibrated.append(f"{name}: {lacks}")
     _finish(bag, found, name, chosen)
     return bag
 

@@ -360,8 +360,20 @@ def test_pitch_and_height_of_disparity_images_take_the_left_camera_alone(tmp_pat
 
     paths = [write_bag(tmp_path, name, "mcap", make) for name, make in (("a", drive(2)), ("b", other))]
     whole, found = (rows(rollcli("estimate", path, cwd=tmp_path).out) for path in paths)
-    for one, two in zip(whole, found, strict=True):
-        assert (one["pitch_deg"], one["height_m"]) == (two["pitch_deg"], two["height_m"])
+    sides = "cam0=[350 0 80; 0 350 60; 0 0 1]\ncam1=[350 0 89; 0 350 60; 0 0 1]"
+    (tmp_path / "calib.txt").write_text(f"{sides}\ndoffs=9\nbaseline=500\nwidth=160\nheight=120\n")
+    given = rows(rollcli("estimate", paths[0], "--calib", "calib.txt", cwd=tmp_path).out)
+    for one, *others in zip(whole, found, given, strict=True):
+        for two in others:
+            assert (one["pitch_deg"], one["height_m"]) == (two["pitch_deg"], two["height_m"])
+
+
+def test_a_bag_with_the_camera_info_of_the_right_view_alone_says_so(tmp_path):
+    def right(store):
+        yield from (each for each in drive(1)(store) if "left" not in each[0])
+
+    done = rollcli("estimate", write_bag(tmp_path, "drive", "mcap", right), cwd=tmp_path)
+    assert "no CameraInfo of the left view, but with a negative Tx" in done.err
 
 
 @pytest.mark.parametrize("given", [(), ("--scale", "-1")])
