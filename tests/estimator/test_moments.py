@@ -56,6 +56,9 @@ def test_no_data_weighs_nothing_however_it_is_written(nothing):
     assert_same(map_moments(holed), map_moments(clean))
     found, same = (estimate_roll(each, road_mask=True).road_mask for each in (holed, clean))
     np.testing.assert_array_equal(found, same)
+    sky = np.maximum(disparity - 78, 0)  # up to the horizon, where the road is as far as what is no data
+    found, same = (estimate_roll(np.where(sky > 0, sky, each), road_mask=True) for each in (nothing, 0))
+    np.testing.assert_array_equal(found.road_mask, same.road_mask)
 
 
 @pytest.mark.parametrize("dtype", ["uint8", "int16", ">u2", "float16", ">f4", "float64", "int64"])

@@ -100,6 +100,7 @@ class Surface:
 
     def _covers(self, disparity: NDArray[Any], first: int, reach: int, tuning: Tuning) -> Bools:
         """Return the same of some rows, from `first` on: they are compared with those `reach` away."""
+        disparity = np.fmax(disparity, 0)  # no data is 0, however the map writes it
         rows, columns = (np.arange(side, dtype=np.float64) for side in disparity.shape)
         x, y = self.grid.normalised(columns, rows[:, None] + first)
         road = self.model.disparity(x, y)
@@ -111,8 +112,7 @@ class Surface:
         # where a wall crosses the surface it is as near as the road, but it does not rise as the road does
         off = disparity - road
         most = np.maximum(tolerance[reach:], np.abs(road[reach:] - road[:-reach]) / 2)
-        with np.errstate(invalid="ignore"):  # neither has data
-            steady = np.abs(off[reach:] - off[:-reach]) < most
+        steady = np.abs(off[reach:] - off[:-reach]) < most
         rises = np.zeros_like(on_it)
         rises[reach:] |= steady
         rises[:-reach] |= steady
