@@ -147,10 +147,11 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
     quarter = in_bands * (2 * tuning.groups) + in_columns
     uneven = _unevenness(heights, leverage, quarter, tuning.groups, tuning.noise_falls)
     cosine, sine, grid = abs(math.cos(theta)), abs(math.sin(theta)), surface.grid
-    view = 2 * (grid.centre_u * cosine + grid.centre_v * sine) / grid.scale  # how wide it is across the road
+    # how wide it is across the road; the middle of the lane leaves a rolled one on one side
+    view = sum(surface.sides) * cosine + 2 * grid.centre_v / grid.scale * sine
     width_at_1 = view * abs(model.alpha[1])  # in camera heights, where the disparity is 1 px
     # where the middle of the lane leaves what was looked at
-    side = grid.centre_u / grid.scale
+    side = surface.sides[theta < 0]
     leaves = min(surface.lowest / max(cosine, _LEAST_SPAN), side / max(sine, _LEAST_SPAN))
     border = model.disparity_along(leaves)
     in_lane = _nearest_seen(plain[np.abs(model.side(across, plain)) < 1], 0.5 / tuning.groups) or nearest

@@ -20,7 +20,7 @@ from rollcli.estimator.road.surface import Surface, whole_surface
 from rollcli.estimator.tuning import TUNING, IntervalTuning
 from rollcli.simulate.dataset import lane_rolls_of
 from rollcli.simulate.spec import FrameSpec
-from tests.estimator.synthetic_maps import bent_road, energy_of, flat_road
+from tests.estimator.synthetic_maps import banked_road, bent_road, energy_of, flat_road
 from tests.real_pairs import LIDAR, needs_lidar
 from tests.true_disparity import true_disparity
 
@@ -83,6 +83,13 @@ def test_where_the_nearest_road_is_hidden_they_hold_the_roll_of_the_lane_from_th
             low, high = float(row["lo_deg"]), float(row["hi_deg"])
             held.append(low - found.roll_ci95_deg <= found.roll_deg <= high + found.roll_ci95_deg)
     assert np.mean(held) >= 0.95 - 3 * math.sqrt(0.95 * 0.05 / 41)
+
+
+def test_as_much_is_hidden_of_a_crop_as_of_its_mirror_image():
+    crop = banked_road(12, cropped=250)
+    found = estimate_roll(crop, Request(middle=60.0)).tangent.jackknife
+    mirrored = estimate_roll(crop[:, ::-1], Request(middle=crop.shape[1] - 61.0)).tangent.jackknife
+    assert found.hidden == pytest.approx(mirrored.hidden, rel=0.1)
 
 
 @pytest.mark.parametrize("roll_deg", [-50, 0, 30])

@@ -107,6 +107,12 @@ class Sample:
     spacing: Spacing
     lowest: float
 
+    @property
+    def sides(self) -> tuple[float, float]:
+        """How far the first column is to the left of the origin, and the last one to the right, units."""
+        left = self.grid.centre_u / self.grid.scale
+        return left, (self.disparity.shape[1] - 1) / self.grid.scale - left
+
 
 def take_sample(
     disparity: NDArray[Any],

@@ -70,6 +70,8 @@ class Surface:
         How far single pixels of the road are off it at most, tolerances.
     lowest : float
         The y of the lowest row that was looked at.
+    sides : tuple of float
+        How far the map's first column is to the left of the origin, and its last one to the right, units.
     """
 
     x: Floats
@@ -86,6 +88,7 @@ class Surface:
     camber_precision: float = math.inf
     limit: float = math.inf
     lowest: float = 0.0
+    sides: tuple[float, float] = (1.0, 1.0)
 
     def covers(self, disparity: NDArray[Any], tuning: Tuning) -> Bools:
         """Return which pixels of a map (H, W) lie on the surface and rise as it does."""
@@ -128,7 +131,9 @@ def whole_surface(sample: Sample, energy: Energy) -> Surface:
     rows[2] *= energy.parabolic
     alpha = solve_normal(rows @ rows.T, rows @ d)
     model = plane._replace(alpha=tuple(alpha.tolist()))
-    return Surface(x, y, d, np.ones(len(d)), model, sample.grid, sample.noise, energy.parabolic)
+    return Surface(
+        x, y, d, np.ones(len(d)), model, sample.grid, sample.noise, energy.parabolic, sides=sample.sides
+    )
 
 
 def fit_surface(sample: Sample, road: Road, request: Request) -> Surface:
@@ -176,6 +181,7 @@ def fit_surface(sample: Sample, road: Road, request: Request) -> Surface:
         camber_precision=camber_precision,
         limit=limit,
         lowest=sample.lowest,
+        sides=sample.sides,
     )
 
 
