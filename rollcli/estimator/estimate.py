@@ -193,7 +193,7 @@ def estimate_roll(
     knife = None if surface is None else jackknife(surface, theta, tuning.interval)
     alpha = pixels.energy.parabola(theta)
     height, width = checked.values.shape
-    tangent = touch(alpha, theta, Grid.of_shape(height, width), surface, knife)
+    tangent = touch(alpha, theta, Grid.of_shape(height, width, request.middle), surface, knife)
     turned = tangent.turned_by(request.slope_error)
     interval = None if knife is None else interval_of(knife, theta, turned, tuning.interval)
     doubts, notes = list(doubts_of(checked, pixels, certified, interval, request)), []

@@ -7,8 +7,10 @@ import pytest
 
 import rollcli
 from rollcli.estimator.road.model import RoadModel
+from rollcli.files.results import Row
 from rollcli.pictures.heights import FittedRoad, heights_over
 from rollcli.rig.calibration import Calibration
+from tests.estimator.synthetic_maps import banked_road
 
 WIDTH, HEIGHT = 640, 240
 CENTRE = (WIDTH - 1) / 2, (HEIGHT - 1) / 2
@@ -138,3 +140,12 @@ def test_a_hill_that_no_parabola_fits_is_level_and_a_dip_in_it_as_deep_as_it_is(
     below *= np.cos(np.arctan(0.003 * z - 0.1))
     lower = rollcli.height_map(seen, rollcli.estimate_roll(seen, calibration=rig), rig)
     assert np.median(lower[dip] + below) == pytest.approx(0, abs=0.002)
+
+
+@pytest.mark.parametrize("options", [{}, {"method": "areas"}, {"road": "all"}])
+def test_those_of_an_estimate_are_those_of_its_row(options):
+    crop, rig = banked_road(2, cropped=200), Calibration(360, 360, 110, 94, 0.5)
+    estimate = rollcli.estimate_roll(crop, calibration=rig, **options)
+    road = FittedRoad.of_row(Row("crop.png", **estimate.to_dict()), rig)
+    heights = heights_over(crop, road, rig)
+    np.testing.assert_allclose(rollcli.height_map(crop, estimate, rig), heights, atol=1e-4)

@@ -15,7 +15,7 @@ from rollcli.estimator.road.sample import take_sample
 from rollcli.estimator.road.surface import Surface, fit_surface, whole_surface
 from rollcli.estimator.solvers.areas import AreaMethod
 from rollcli.estimator.solvers.solution import Solution
-from rollcli.estimator.tuning import SampleTuning, Tuning
+from rollcli.estimator.tuning import Tuning
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def select_pixels(checked: CheckedMap, request: Request) -> PixelSet:
         energy = Energy.of(moments, parabolic=surface.parabolic)
         return PixelSet(energy, surface, road, surface.share)
     energy = Energy.of(map_moments(values, usable), parabolic=request.parabolic)
-    return PixelSet(energy, _sampled_surface(values, usable, energy, tuning.sample), None, 1.0)
+    return PixelSet(energy, _sampled_surface(values, usable, energy, request), None, 1.0)
 
 
 def _area_pixels(
@@ -88,14 +88,14 @@ def _area_pixels(
     candidates = checked.valid if surface is None else checked.valid & surface.covers(values, request.tuning)
     choose: AreaMethod = AREAS[request.method].load()
     used, energy, solution = choose(values, candidates, request, checked.usable is not None)
-    sampled = _sampled_surface(values, used, energy, request.tuning.sample)
+    sampled = _sampled_surface(values, used, energy, request)
     return PixelSet(energy, sampled, road, np.count_nonzero(used) / checked.count, used, solution)
 
 
 def _sampled_surface(
-    values: NDArray[Any], used: Bools | None, energy: Energy, tuning: SampleTuning
+    values: NDArray[Any], used: Bools | None, energy: Energy, request: Request
 ) -> Surface | None:
     try:
-        return whole_surface(take_sample(values, used, tuning), energy)
+        return whole_surface(take_sample(values, used, request.tuning.sample, request.middle), energy)
     except EstimationError:  # too small a map to be sampled: an angle without an interval
         return None
