@@ -25,7 +25,7 @@ from rollcli.run.options import (
     VDisparityOptions,
 )
 from rollcli.run.progress import Progress
-from rollcli.run.resume import recorded_options
+from rollcli.run.resume import recorded_calibrations, recorded_options
 from rollcli.run.workers.interrupt import stop_on_signals
 from rollcli.run.workers.tasks import require_scheduler, run_tasks
 
@@ -141,9 +141,11 @@ def _rows_of(frames: Sequence[Frame], result: str, options: ConvertOptions) -> l
     if elsewhere:
         recorded = recorded_options(read.run, run_path(result))
         mask_of = _masks_of(recorded, result)
+        cameras = (*recorded_calibrations(read.run), None)
         for at in {round(i * (len(elsewhere) - 1) / (_COMPARED - 1)): None for i in range(_COMPARED)}:
             frame, row = elsewhere[at]
-            if not _is_copy(frame._replace(mask=mask_of(row.file)), row, recorded):
+            frame = frame._replace(mask=mask_of(row.file))
+            if not any(_is_copy(frame._replace(calibration=each), row, recorded) for each in cameras):
                 differ = f"its row is of {row.file}, and not of {frame.file}"
                 raise UsageError(f"{result}: {differ}: give the result of these maps")
     _tell_suspects(matched, options)
@@ -166,11 +168,12 @@ def _is_copy(frame: Frame, row: Row, options: FrameOptions) -> bool:
 
     try:
         source = read_source(frame, options)
-        found = estimate_roll(source.disparity, options.method.request(), mask=source.allowed)
+        request = options.method.request(calibration=source.calibrated(frame.calibration))
+        found = estimate_roll(source.disparity, request, mask=source.allowed)
     except (OSError, RollcliError):
         return False
     # of a pair the row is of the road matched along its plane, the map of all that was matched; with a
-    # calibration the row is of the lane below the principal point
+    # calibration the row is of the lane below the principal point, and not each of many is recorded
     other = row.right_file or row.pitch_deg is not None
     most = max(_SAME_DEG, row.roll_ci95_deg or 0.0) if other else _SAME_DEG
     return abs(math.degrees(found.theta) - (row.map_roll_deg or 0.0)) < most

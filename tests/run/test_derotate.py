@@ -106,3 +106,15 @@ def test_a_map_whose_pixels_are_not_square_is_turned_by_the_images_angle(tmp_pat
 
     left = estimate_roll(np.load(tmp_path / "out" / "one.npy"))
     assert math.degrees(left.theta) == pytest.approx(0, abs=0.05)
+
+
+def test_copies_of_maps_are_known_by_the_calibration_that_the_maps_had(tmp_path):
+    v, u = np.mgrid[:120, :320]
+    across, down = (u - 99.5) / 200, v / 200
+    # 1.5 m below the rig, a crown that falls by 11 cm 4 m to the side, where the roll is another one
+    disparity = 100 / 3 * (down + np.sqrt(np.maximum(down**2 - 0.04 * across**2, 0)))
+    for folder in ("maps", "copies"):
+        write_kitti(tmp_path / folder / "one.png", np.where(down > 0.2, disparity, 0))
+    camera = ("--focal", "200", "--principal-point", "99.5,0.1", "--baseline", "0.5")
+    rollcli("estimate", "maps", *camera, "-o", "rolls.csv", cwd=tmp_path, status=0)
+    assert rollcli("derotate", "copies", "--from", "rolls.csv", "-o", "out", cwd=tmp_path, status=0).err
