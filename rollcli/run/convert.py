@@ -142,6 +142,8 @@ def _rows_of(frames: Sequence[Frame], result: str, options: ConvertOptions) -> l
         recorded = recorded_options(read.run, run_path(result))
         mask_of = _masks_of(recorded, result)
         cameras = (*recorded_calibrations(read.run), None)
+        # a suspect angle of a pair need not be that of its map
+        elsewhere = [each for each in elsewhere if each[1].status == "ok"] or elsewhere
         for at in {round(i * (len(elsewhere) - 1) / (_COMPARED - 1)): None for i in range(_COMPARED)}:
             frame, row = elsewhere[at]
             frame = frame._replace(mask=mask_of(row.file))
