@@ -111,7 +111,7 @@ def with_pose(estimate: RollEstimate, calibration: Calibration) -> RollEstimate:
     return replace(
         estimate,
         theta=pose.roll,
-        ci95=None if estimate.ci95 is None else estimate.ci95 * turns,
+        ci95=None if estimate.ci95 is None else min(estimate.ci95 * turns, math.pi / 2),
         pitch=pose.pitch,
         pitch_ci95=pitch_ci95,
         height_m=pose.height,
