@@ -190,9 +190,9 @@ class Cells:
     frames: int
 
     def design(self, starts: Sequence[int], drift: bool) -> Floats:
-        """Return the level at the last frame of each stretch between jumps, shape (C, stretches).
+        """Return the level of each stretch between jumps, shape (C, stretches).
 
-        If asked for, the drift over the drive is a further column.
+        If asked for, the drift is a further column; levels are then drawn out to the last frame of the drive.
         """
         stretch = np.searchsorted(np.asarray(starts), self.first, side="right")
         columns: Floats = (stretch[:, None] == np.arange(len(starts) + 1)).astype(float)
