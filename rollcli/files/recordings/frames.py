@@ -91,7 +91,7 @@ def maps_of_bag(files: Sequence[str], name: str, topic: str | None) -> BagFrames
             break
     if stated < 0 and right is None:
         bag.notes.append(f"{name}: {chosen} states a baseline T of {stated:g} m: taken as {-stated:g} m")
-    bag.calibration = _calibration(left, right, abs(stated), f"CameraInfo of {name}")
+    _calibrate(bag, left, right, abs(stated), name)
     if bag.calibration is not None and has_doffs:
         bag.calibration = replace(bag.calibration, doffs=0.0)
     if bag.calibration is None and (found.cameras or has_doffs):
@@ -138,7 +138,7 @@ def pairs_of_bag(files: Sequence[str], name: str, left: str, right: str, toleran
             f"{name}: no views of {left} and {right} are within {tolerance_ns / 1e6:g} ms: --sync-tolerance"
         )
     one, other = (found.cameras.get(_beside(topic)) for topic in (left, right))
-    bag.calibration = _calibration(one, other, 0.0, f"CameraInfo of {name}")
+    _calibrate(bag, one, other, 0.0, name)
     if bag.calibration is None and found.cameras:
         bag.uncalibrated.append(f"{name}: {_beside(left)} is {_NO_P}")
     _finish(bag, found, name, f"{left} and {right}")
@@ -339,21 +339,24 @@ def _cameras(found: _Found, topic: str) -> tuple[CameraInfo | None, CameraInfo |
 
     # the origin of P is the left camera, the right one or one between them
     left = nearest("left", [each for each in usable if each[1].across >= 0])
-    right = nearest("right", [each for each in usable if left is None or each[1].across < left.across])
+    fitting = [each for each in usable if left is None or each[1].across < left.across]
+    right = nearest("right", fitting or [each for each in usable if "right" in each[0]])  # of a wrong sign
     return left, right
 
 
-def _calibration(
-    left: CameraInfo | None, right: CameraInfo | None, baseline: float, source: str
-) -> Calibration | None:
-    """Make the calibration of the rectified pair; None where the left camera's P is not known."""
+def _calibrate(
+    bag: BagFrames, left: CameraInfo | None, right: CameraInfo | None, baseline: float, name: str
+) -> None:
+    """Make the calibration of the rectified pair; none where the left camera's P is not known."""
     if left is None or not left.usable:
-        return None
+        return
     p, doffs = left.p, 0.0
     if right is not None and right.usable and right.across != left.across:
         baseline, doffs = abs(left.across - right.across), right.p[2] - p[2]
-    size = (left.width or None, left.height or None)
-    return Calibration(p[0], p[5], p[2], p[6], baseline or None, doffs, *size, source=source)
+        if right.across > left.across:
+            bag.notes.append(f"{name}: the right view's Tx is positive, against ROS: its size is taken")
+    size, source = (left.width or None, left.height or None), f"CameraInfo of {name}"
+    bag.calibration = Calibration(p[0], p[5], p[2], p[6], baseline or None, doffs, *size, source=source)
 
 
 def _rectified(found: _Found, topic: str, frame: Input) -> Input:

@@ -302,10 +302,14 @@ def test_one_camera_gives_the_calibration_of_maps_that_state_their_baseline(tmp_
     assert (frame.calibration.fx, frame.calibration.baseline, frame.calibration.doffs) == (350, 0.25, 0)
 
 
-@pytest.mark.parametrize("across", [(22.4, -168.0), (190.4, 0.0)])
-def test_maps_of_cameras_whose_p_refers_to_another_one_have_a_calibration(tmp_path, across):
+@pytest.mark.parametrize(
+    ("names", "across"), [("ab", (22.4, -168.0)), ("ab", (190.4, 0.0)), (("left", "right"), (0.0, 190.4))]
+)
+def test_maps_of_cameras_whose_p_refers_to_another_one_have_a_calibration(tmp_path, names, across):
+    """Or whose right one has its Tx with the wrong sign."""
+
     def make(store):
-        for side, x in zip("ab", across, strict=True):
+        for side, x in zip(names, across, strict=True):
             yield f"/{side}/camera_info", START, camera_info(store, START, (160, 120), (*P[:3], x, *P[4:]))
         yield "/maps", START, image(store, maps(1)[0], "32FC1", START)
 
