@@ -5,6 +5,7 @@ import glob
 import itertools
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path, PurePosixPath
 from typing import overload
@@ -413,9 +414,12 @@ def _in_bags(bags: _Bags, options: FramesOptions) -> Iterator[_Named]:
         known, given = bag.calibration, options.calibration
         options.running.note(*bag.notes, *([] if given.given else bag.uncalibrated))
         known = None if known is None or given.calib else with_numbers(known, given)
-        own = given._replace(doffs=0.0) if bag.has_doffs and given.doffs is None else given
-        of = calibration_finder(own) if given.calib else None
-        yield from ((*views, of(views[0].name) if of else known) for views in bag.frames)
+        of = calibration_finder(given) if given.calib else None
+        for views in bag.frames:
+            camera = of(views[0].name) if of else known
+            if camera is not None and bag.has_doffs and given.doffs is None:
+                camera = replace(camera, doffs=0.0)
+            yield (*views, camera)
 
 
 def _frame_maker(options: FramesOptions) -> Callable[..., Frame]:
