@@ -32,6 +32,7 @@ from rollcli.estimator.road.model import FARTHEST_SIDE, Coordinate, RoadModel
 from rollcli.estimator.road.sample import medians_of
 from rollcli.files.results import Row
 from rollcli.rig.calibration import Calibration, require_calibration
+from rollcli.rig.pose import turns_of
 
 Flags = NDArray[np.bool_]
 
@@ -76,24 +77,28 @@ class FittedRoad:
     @classmethod
     def of_estimate(cls, estimate: RollEstimate) -> "FittedRoad":
         """Take the road of an estimate, with or without a pose."""
-        # the angle of the pixels, which is not the rig's where fx and fy differ
-        model = RoadModel(estimate.tangent.theta, estimate.alpha, estimate.camber or 0.0)
+        # of the pixels, which are not the rig's where fx and fy differ
+        knife = estimate.tangent.jackknife
+        camber = None if knife is None else knife.camber
+        model = RoadModel(estimate.tangent.theta, estimate.alpha, camber or 0.0)
         return cls(model, estimate.width, estimate.height, estimate.tangent.grid.centre_u)
 
     @classmethod
     def of_row(cls, row: Row, calibration: Calibration | None) -> "FittedRoad | None":
         """Take the road of a row of a result; None where the row has none.
 
-        The roll of a row with a pitch is the rig's: where fx and fy differ and the row has that alone,
-        `calibration` turns it back into that of the pixels.
+        Roll and camber of a row with a pitch are the rig's: where fx and fy differ, `calibration` turns them
+        back into those of the pixels, the roll where the row has that of the rig alone.
         """
         if row.map_roll_deg is None or row.width is None or row.height is None or row.alpha is None:
             return None
         theta = math.radians(row.map_roll_deg)
         if calibration is not None and row.pitch_deg is not None and row.image_roll_deg is None:
             theta = math.atan2(math.sin(theta) * calibration.fy / calibration.fx, math.cos(theta))
-        ahead = None if calibration is None or row.pitch_deg is None else calibration.cx
-        return cls(RoadModel(theta, row.alpha, row.camber or 0.0), row.width, row.height, ahead)
+        ahead, camber = None, row.camber or 0.0
+        if calibration is not None and row.pitch_deg is not None:
+            ahead, camber = calibration.cx, camber / turns_of(theta, calibration) ** 2
+        return cls(RoadModel(theta, row.alpha, camber), row.width, row.height, ahead)
 
     @property
     def middle(self) -> tuple[float, float]:

@@ -105,18 +105,26 @@ def with_pose(estimate: RollEstimate, calibration: Calibration) -> RollEstimate:
         return replace(estimate, message="; ".join(filter(None, [estimate.message, why])))
     pose = pose_of(tangent, calibration)
     pitch_ci95, height_ci95 = _half_widths(tangent, calibration, pose)
-    ratio = calibration.fy / calibration.fx
-    # the rig's roll turns by so much more than the image's: tan(roll) = tan(theta) / ratio
-    turns = ratio / (ratio**2 * math.cos(tangent.theta) ** 2 + math.sin(tangent.theta) ** 2)
+    turns = turns_of(tangent.theta, calibration)
     return replace(
         estimate,
         theta=pose.roll,
         ci95=None if estimate.ci95 is None else min(estimate.ci95 * turns, math.pi / 2),
+        camber=None if estimate.camber is None else estimate.camber * turns**2,
         pitch=pose.pitch,
         pitch_ci95=pitch_ci95,
         height_m=pose.height,
         height_ci95_m=height_ci95,
     )
+
+
+def turns_of(theta: float, calibration: Calibration) -> float:
+    """Return by how much more than the image the rig turns: tan(roll) = fx / fy tan(theta).
+
+    So much nearer, too, a place to the side of the road is than square pixels would have it.
+    """
+    ratio = calibration.fy / calibration.fx
+    return ratio / (ratio**2 * math.cos(theta) ** 2 + math.sin(theta) ** 2)
 
 
 def horizon_row(tangent: Tangent, calibration: Calibration) -> float | None:

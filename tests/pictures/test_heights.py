@@ -144,7 +144,7 @@ def test_a_hill_that_no_parabola_fits_is_level_and_a_dip_in_it_as_deep_as_it_is(
 
 @pytest.mark.parametrize("options", [{}, {"method": "areas"}, {"road": "all"}])
 def test_those_of_an_estimate_are_those_of_its_row(options):
-    crop, rig = banked_road(2, cropped=200), Calibration(360, 360, 110, 94, 0.5)
+    crop, rig = banked_road(2, cropped=200), Calibration(360, 300, 110, 94, 0.5)
     estimate = rollcli.estimate_roll(crop, calibration=rig, **options)
     road = FittedRoad.of_row(Row("crop.png", **estimate.to_dict()), rig)
     heights = heights_over(crop, road, rig)
