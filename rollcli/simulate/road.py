@@ -223,8 +223,8 @@ class Site:
             ends.append(side * np.inf)
             materials.append(beyond)
         foot = base + (self.road.relief.span[0] if self.road.relief else 0.0)
-        kerb = Wall(self.road.course, edge, foot, np.array([-50.0, FAR]), np.array([level]), stone)
         edges, course, relief = tuple(ends[::side]), self.road.course, self.road.relief
+        kerb = Wall(course, edge, foot, np.array([-50.0, FAR]), np.array([level]), stone, relief)
         strips = Ground(course, edges, tuple(materials[::side]), FAR, offset=level, relief=relief)
         self.scene.surfaces += [kerb, strips]
         return level, edge + side * width

@@ -123,11 +123,13 @@ class Ground(Surface):
         """Return the ray parameters where rays first hit the sheet, edges ignored; nan where they miss."""
         if self.relief is None:
             return self._first_smooth_hit(origin, direction)
-        first, last = (
-            replace(self, offset=self.offset + raised)._first_smooth_hit(origin, direction)
-            for raised in reversed(self.relief.span)
+        lowest, highest = (
+            replace(self, offset=self.offset + raised, relief=None) for raised in self.relief.span
         )
-        last = np.fmax(first, last)
+        # a low camera stands below the highest ground
+        begin = np.where(highest._above(origin) > 0, np.nan, NEAR)
+        first = np.fmax(highest._first_smooth_hit(origin, direction), begin)
+        last = np.fmax(first, lowest._first_smooth_hit(origin, direction))
         ends = [origin + t * direction for t in (first, last)]
         sides, ahead = [self.course.lateral(end) for end in ends], [end[2] for end in ends]
         inside = (np.fmax(*sides) >= self.edges[0]) & (np.fmin(*sides) < self.edges[-1])
@@ -174,6 +176,7 @@ class Ground(Surface):
             end = np.where(direction[2] > 0, (self.far - origin[2]) / direction[2], _FARTHEST)
         # over a crest a ray may miss the lowest, and leaves the highest again: where it meets it backwards
         left = end - highest._first_smooth_hit(origin + end * direction, -direction)
+        left[left < 0] = np.nan
         last = np.fmin(lowest._first_smooth_hit(origin, direction), left)
         last = np.fmax(first, np.where(np.isnan(last), end, last))
         return _first_descent(lambda t: smooth._above(origin + t * direction), first, last, _TO_ROUNDING)
@@ -191,7 +194,7 @@ class Ground(Surface):
 
 @dataclass(frozen=True)
 class Wall(Surface):
-    """The vertical face at `lateral`: from edges[i] to edges[i + 1] in Z it rises from `base` to tops[i]."""
+    """A vertical face at `lateral`, from edges[i] to edges[i + 1] in Z: from `base` to tops[i] on relief."""
 
     course: Course
     lateral: float
@@ -199,6 +202,7 @@ class Wall(Surface):
     edges: Array
     tops: Array
     material: int
+    relief: Relief | None = None
 
     def intersect(self, origin: Array, direction: Array) -> Array:
         (ox, _, oz), (rx, _, rz) = origin, direction
@@ -212,6 +216,8 @@ class Wall(Surface):
         section = np.searchsorted(self.edges, points[2]) - 1
         inside = (section >= 0) & (section < len(self.tops))
         top = self.tops[np.where(inside, section, 0)]
+        if self.relief is not None:
+            top = top + self.relief.height(np.full_like(t, self.lateral), np.where(inside, points[2], 0.0))
         return np.where(inside & (elevation >= self.base) & (elevation < top), t, np.inf)
 
     def sample(self, points: Array) -> SurfaceSample:
@@ -246,13 +252,13 @@ class Backdrop(Surface):
 
 
 def first_root(a: Array, b: Array, c: Array) -> Array:
-    """Return the first t > NEAR with a t^2 + b t + c = 0, where c > 0; nan where there is none.
+    """Return the t > NEAR at which a t^2 + b t + c falls to 0; nan where there is none.
 
     The form 2c / (-b + sqrt(discriminant)) stays exact as `a` vanishes.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         t = 2 * c / (np.sqrt(b * b - 4 * a * c) - b)
-        return np.where((c > 0) & (t > NEAR) & (t < _FARTHEST), t, np.nan)
+        return np.where((t > NEAR) & (t < _FARTHEST), t, np.nan)
 
 
 def _first_descent(above: Callable[[Array], Array], first: Array, last: Array, bisections: int) -> Array:

@@ -97,6 +97,12 @@ def every_pixel(spec):
     return scene, camera.rays_of(range(spec.size[1]))
 
 
+def test_no_ray_passes_between_uneven_ground_and_its_kerbs():
+    scene, rays = every_pixel(FrameSpec("open", roughness="C", size=(160, 120), focal=93))
+    scene.surfaces = [each for each in scene.surfaces if isinstance(each, Ground | Wall)]
+    assert np.isfinite(first_hits(scene, rays)[0][rays.direction[1] < -0.05]).all()
+
+
 @pytest.mark.parametrize("seed", [3, 11, 19])
 @pytest.mark.parametrize("scene", ["open", "street", "verge"])
 def test_each_ray_meets_the_nearest_of_all_surfaces(scene, seed):
