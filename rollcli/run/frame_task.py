@@ -68,7 +68,7 @@ def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
     write_outputs(frame, files, options)
     elapsed = 1000 * (time.perf_counter() - start)
     noted = {**notes, **(frame.decoded.notes if frame.decoded else {})}
-    inputs = inputs_line(frame, noted, options.at) if options.notes else b""
+    inputs = inputs_line(frame, noted, options) if options.notes else b""
     return replace(result, row=replace(result.row, elapsed_ms=elapsed), inputs=inputs)
 
 

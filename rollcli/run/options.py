@@ -336,8 +336,8 @@ class FrameOptions(NamedTuple):
     `writes` are its files, as a worker locates them. `root` is the folder where relative paths start, for
     workers on other machines; empty for this one. `replaces` tells whether files that are in the place of an
     image are replaced. `retry_of` names the result whose failed frames are done again; empty otherwise.
-    `notes` tells whether workers say what each frame was read from. `convert` is the conversion that makes
-    the files; None: the roll is estimated.
+    `run` names the run: what no worker sees changing, an object, is read anew by each. `notes` tells whether
+    workers say what each frame was read from. `convert` is the conversion that makes the files, if one does.
     """
 
     encoding: EncodingOptions = EncodingOptions()
@@ -350,6 +350,7 @@ class FrameOptions(NamedTuple):
     root: str = ""
     replaces: bool = False
     retry_of: str = ""
+    run: str = ""
     notes: bool = False
     convert: "ConvertOptions | None" = None
 

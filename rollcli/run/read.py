@@ -47,7 +47,7 @@ def region_mask(mask: str | None, options: FrameOptions, shape: tuple[int, ...])
         return None
     allowed = _drawn(region, shape)
     if mask is not None:
-        usable = _mask_file(options.at(mask), mask, state_of(options.at(mask)))
+        usable = _mask_file(options.at(mask), mask, state_of(options.at(mask)) or options.run)
         if usable.shape != shape:
             raise InputError(f"the mask {mask} is {_size(usable.shape)}, the map {_size(shape)}")
         allowed = allowed & usable

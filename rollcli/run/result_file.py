@@ -12,7 +12,7 @@ import io
 import os
 import re
 import stat
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from hashlib import blake2b
 from itertools import combinations
@@ -26,6 +26,7 @@ from rollcli.files.storage import Note, noting, read_frame, state_of
 from rollcli.files.stores.locations import is_object_url, is_url
 from rollcli.files.stores.objects import list_objects
 from rollcli.run.frame import Frame
+from rollcli.run.options import FrameOptions
 
 _HEADERS = tuple(
     format_header("csv", further)
@@ -243,6 +244,7 @@ def _reopen(descriptor: int, path: str, flags: int) -> None:
 
 _PART_ENDING = "inputs"
 _HEX = 16
+_HERE = FrameOptions()
 _WIDTH = 3 * (_HEX + 1)
 _UNKNOWN = b"-" * _HEX
 _LINE = re.compile(rb"([0-9a-f]{16} )([0-9a-f]{16}|-{16}) ([0-9a-f]{16}|-{16})\n")
@@ -274,7 +276,7 @@ def _line(name: bytes, state: bytes = _UNKNOWN, content: bytes = _UNKNOWN) -> by
     return b" ".join((name, state, content)) + b"\n"
 
 
-def inputs_line(frame: Frame, notes: Mapping[str, Note], at: Callable[[str], str] = str) -> bytes:
+def inputs_line(frame: Frame, notes: Mapping[str, Note], options: FrameOptions = _HERE) -> bytes:
     """Make the line of a frame; of one whose files were not all read, it says nothing of them.
 
     Parameters
@@ -282,14 +284,14 @@ def inputs_line(frame: Frame, notes: Mapping[str, Note], at: Callable[[str], str
     frame : Frame
     notes : mapping from str to Note
         What was read for it, by location.
-    at : callable
-        Locates a path of the frame on this machine.
+    options : FrameOptions
+        Locate a path of the frame on this machine.
     """
     found = []
     for path in frame.reads():
-        note = notes.get(at(path))
+        note = notes.get(place := options.at(path))
         if note is None and path == frame.mask:  # that of the frame before, which is not read again
-            note = _mask_note(at(path), state_of(at(path)))
+            note = _mask_note(place, state_of(place) or options.run)
         if note is None:
             return _line(_name(frame))
         found.append(note)

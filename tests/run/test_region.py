@@ -74,6 +74,13 @@ def test_what_is_no_number_in_a_mask_is_not_used(tmp_path):
     np.testing.assert_array_equal(usable_of(values), V > 30)
 
 
+def test_a_mask_below_a_url_is_read_anew_by_each_run(monkeypatch):
+    for run, mask in (("first", V > 30), ("second", V > 50)):
+        data = cv2.imencode(".png", np.uint8(mask))[1].tobytes()
+        monkeypatch.setattr("rollcli.run.read.read_bytes", lambda *_, data=data: data)
+        np.testing.assert_array_equal(region_mask("s3://maps/m.png", FrameOptions(run=run), SHAPE), mask)
+
+
 @pytest.mark.parametrize("depth", [np.uint8, np.uint16])
 def test_transparent_pixels_of_a_mask_are_not_used(tmp_path, depth):
     shown = np.where(V > 60, np.iinfo(depth).max, 0).astype(depth)
