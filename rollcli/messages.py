@@ -11,7 +11,7 @@ from typing import Any
 from rollcli.errors import raised_at
 
 _shows_tracebacks = False
-_ADDRESS = re.compile(r"(https?://)(?:[^\s/?#@]*@)?([^\s?#'\"]*)(?:[?#][^\s'\"]*(?<!:))?", re.IGNORECASE)
+_ADDRESS = re.compile(r"(https?://)(?:[^\s/?#]*@)?([^\s?#'\"]*)(?:[?#][^\s'\"]*(?<!:))?", re.IGNORECASE)
 _NAMES = "x-amz-[a-z-]+|x-goog-[a-z-]+|sig|signature|awsaccesskeyid|googleaccessid|key-pair-id|policy|token"
 _SIGNATURE = re.compile(rf"[?&](?:{_NAMES})=[^\s&'\"]*", re.IGNORECASE)  # in a URL, behind a space in that
 

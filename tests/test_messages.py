@@ -23,9 +23,9 @@ def test_what_a_terminal_would_obey_or_hide_is_escaped(text, shown):
     assert printable(text) == shown
 
 
-def test_a_message_is_one_line_with_the_programs_name(capsys):
-    say("a\nb")
-    assert capsys.readouterr().err == "rollcli: a\\nb\n"
+def test_a_message_is_one_line_with_the_programs_name_and_without_passwords(capsys):
+    say("a\nb", "https://me:p@ss@host/x@y.png: is empty")
+    assert capsys.readouterr().err == "rollcli: a\\nb\nrollcli: https://host/x@y.png: is empty\n"
 
 
 LOST = """
