@@ -19,7 +19,7 @@ from rollcli.rig.drive.assess import RigAssessment, RigFrames, assess_frames, di
 from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.quantities import ALIGNMENT, COLUMNS, QUANTITIES, ROLL
 from rollcli.rig.words import findings
-from rollcli.run.find import calibration_finder
+from rollcli.run.find import calibration_files, calibration_finder
 from rollcli.run.frame import Frame, frame_of_row
 from rollcli.run.options import FrameOptions, RegionOptions, RigOptions
 from rollcli.run.outputs import check_named_once, listed_only
@@ -231,7 +231,7 @@ def run_rig(options: RigOptions) -> int:
     if options.output == options.correction == STREAM:
         raise UsageError("--correction and the answer cannot both go to stdout: name a file for one of them")
     check_options(options.gates)
-    if listed_only(lambda: [(reads, writes)], options.running):
+    if listed_only(lambda: [([*reads, *calibration_files(options.calibration)], writes)], options.running):
         return 0
     rig, missing, notes = _assessed(options.results, options)
     after, changes = None, dict[str, Estimate]()
