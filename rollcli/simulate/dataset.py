@@ -8,6 +8,7 @@ import math
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -338,11 +339,12 @@ def run_simulate(
         )
     progress = TaskProgress(len(dataset.specs), running)
     progress.kept = len(dataset.kept or ())
-    with stop_on_signals() as stop, progress:
+    # a second Ctrl-C does not wait for the frames that have begun
+    with stop_on_signals() as stop, suppress(KeyboardInterrupt), progress:
         for stem in write_dataset(dataset, running.jobs, stop):
             progress.advance()
             progress.detail(f"{stem} written")
-    if progress.done < progress.total:
+    if stop.at_once or progress.done < progress.total:
         say(f"interrupted after {progress.done} of {progress.total} frames; continue with: {resume_command}")
         return ExitStatus.INTERRUPTED
     rendered = progress.done - progress.kept

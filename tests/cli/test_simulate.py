@@ -11,17 +11,17 @@ from tests.run_cli import command, rollcli, started, wait_until
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 @pytest.mark.slow
-@pytest.mark.parametrize("jobs", ["1", "2"])
-def test_ctrl_c_ends_it_with_status_130_and_without_truth(tmp_path, jobs):
+@pytest.mark.parametrize(("jobs", "signals"), [("1", 1), ("2", 1), ("1", 2), ("2", 2)])
+def test_ctrl_c_ends_it_with_status_130_and_without_truth(tmp_path, jobs, signals):
     run = started("simulate", "rig", "--frames", "700", "--size", "64x48", "-j", jobs, cwd=tmp_path)
     wait_until((tmp_path / "rig/disparity/frame_0003.png").exists, run)
-    run.send_signal(signal.SIGINT)
+    for each in (signal.SIGINT, signal.SIGTERM)[:signals]:
+        run.send_signal(each)
     _, err = run.communicate(timeout=30)
     assert run.returncode == 130
     assert err.count("\n") == 1
-    assert "of 700 frames; continue with: rollcli simulate rig --frames 700" in err.replace(
-        command()[0], "rollcli"
-    )
+    said = err.replace(command()[0], "rollcli")
+    assert "of 700 frames; continue with: rollcli simulate rig --frames 700" in said
     assert err.rstrip().endswith("--resume")
     assert not (tmp_path / "rig/truth.csv").exists()
 
