@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 from rollcli.estimator.estimate import estimate_roll
-from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import read_image, read_stored
 from rollcli.pictures.derotate import derotate
 from rollcli.pictures.heights import CAMERA_HEIGHTS, METRES, FittedRoad, heights_over, steadied, unit_of
 from rollcli.pictures.overlay import draw_disparity, draw_heights, draw_road
 from rollcli.pictures.vdisparity import draw_v_disparity, row_offset, v_disparity
 from rollcli.report.sources import Subject
-from rollcli.run.options import FrameOptions
+from rollcli.run.options import EncodingOptions, FrameOptions
 from rollcli.run.read import FRAME_ERRORS, Source, read_source
 
 # small enough that a page with a dozen frames opens at once, large enough to see a stripe of noise
@@ -89,19 +88,28 @@ def _attempt(make: Callable[[], Made]) -> tuple[Made | None, str]:
 
 
 def _source(subject: Subject) -> Source:
-    frame, options = subject.frame, subject.options
+    options = subject.options
     if "disparity" in subject.images:
-        of_map = frame._replace(path=subject.images["disparity"], right_path="", right_file="", mask=None)
-        source = read_source(of_map, FrameOptions())
+        source = _read(subject, FrameOptions(), "disparity")
         if source.size is not None:
             return source
         height, width = source.disparity.shape
-        downscale = options.stereo.downscale if frame.right_file else 1.0
+        downscale = options.stereo.downscale if subject.frame.right_file else 1.0
         return replace(source, size=(round(width * downscale), round(height * downscale)))
     if subject.refused:
         raise InputError(subject.refused)
     # a pair's left image is kept where the road is to be drawn on it
-    return read_source(frame, options._replace(images=options.images._replace(road_mask="")))
+    return _read(subject, options._replace(images=options.images._replace(road_mask="")))
+
+
+def _read(subject: Subject, options: FrameOptions, kind: str = "") -> Source:
+    """Read a map or match a pair; `kind`: read this image of it, a map."""
+    frame = subject.frame
+    if kind:
+        frame = frame._replace(path=subject.images[kind], right_path="", right_file="", mask=None)
+    if options.encoding.encoding == "depth" and not frame.right_file and frame.calibration is None:
+        raise InputError(f"{frame.file}: its depths need its calibration, which the result's record lacks")
+    return read_source(frame, options)
 
 
 def _road(subject: Subject, source: Source | None) -> NDArray[Any] | None:
@@ -121,9 +129,8 @@ def _road(subject: Subject, source: Source | None) -> NDArray[Any] | None:
 def _level(subject: Subject, disparity: NDArray[Any] | None) -> NDArray[Any] | None:
     """Return the map de-rotated: as `estimate` wrote it, else made."""
     if "derotated" in subject.images:
-        stored, given = read_stored(subject.images["derotated"]), subject.options.encoding
-        encoding = "auto" if subject.frame.right_file else given.encoding
-        return to_disparity(stored, encoding=encoding, scale=given.scale, invalid=given.invalid).disparity
+        given = EncodingOptions() if subject.frame.right_file else subject.options.encoding
+        return _read(subject, FrameOptions(given), "derotated").disparity
     return None if disparity is None else derotate(disparity, subject.theta)
 
 

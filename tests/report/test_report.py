@@ -222,6 +222,17 @@ def test_heights_are_shown_as_estimate_drew_them_or_made_in_the_same_colours(tmp
         assert off < 4  # WebP loses a little
 
 
+def test_a_derotated_map_of_depths_is_shown_in_pixels_or_not_at_all(tmp_path):
+    np.save(tmp_path / "a.npy", 50 / road_map())
+    rig = ["--focal", "100", "--principal-point", "80,9", "--baseline", "0.5", "--encoding", "depth"]
+    rollcli("estimate", "a.npy", *rig, "-o", "rolls.csv", "--derotated", "out/derotated", cwd=tmp_path)
+    ways = (["--overwrite"], ["--overwrite", "--images", "out"])
+    shown = [report(tmp_path, "rolls.csv", *way) and seen(pictures_of(tmp_path)[-1]) for way in ways]
+    assert np.abs(shown[0] - shown[1]).mean() < 0.5
+    (tmp_path / "rolls.csv.run.json").write_text('{"options": {"encoding": "depth"}}')
+    assert [report(tmp_path, "rolls.csv", *way).status for way in ways] == [3, 3]
+
+
 @pytest.mark.slow
 def test_results_of_several_runs_are_drives_and_shards_are_one(tmp_path):
     for name, roll in (("a", 1.0), ("b", -2.0)):
