@@ -60,13 +60,15 @@ def written_at(result: str) -> str:
 
 
 def common_run(runs: Sequence[Mapping[str, Any] | None]) -> Mapping[str, Any] | None:
-    """Return what the records of several runs have in common, and every encoding that was seen."""
+    """Return what the records of several runs have in common, and every version and encoding of theirs."""
     if len(runs) == 1 or None in runs:
         return runs[0] if len(runs) == 1 else None
     known = [each for each in runs if each is not None]
     encodings = [name for each in known for name in each.get("encoding") or ()]
     options = _in_common([each.get("options", {}) for each in known])
-    return {**_in_common(known), "options": options, "encoding": list(dict.fromkeys(encodings))}
+    versions = ", ".join(dict.fromkeys(str(each["rollcli"]) for each in known if each.get("rollcli")))
+    found = {**_in_common(known), "options": options, "encoding": list(dict.fromkeys(encodings))}
+    return {**found, "rollcli": versions} if versions else found
 
 
 def _in_common(runs: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

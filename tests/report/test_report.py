@@ -238,12 +238,12 @@ def test_results_of_several_runs_are_drives_and_shards_are_one(tmp_path):
     for name, roll in (("a", 1.0), ("b", -2.0)):
         turns = np.random.default_rng(5).normal(roll, 0.05, 40)
         write_result(tmp_path / f"{name}.csv", [row(f"m/{at:03}.png", turn) for at, turn in enumerate(turns)])
-        (tmp_path / f"{name}.csv.run.json").write_text(json.dumps({"options": {"shard": "1/1"}}))
+        (tmp_path / f"{name}.csv.run.json").write_text(f'{{"rollcli": "{name}", "options": {{}}}}')
 
     assert rollcli("report", "a.csv", "b.csv", "-o", "page.html", "--gallery", "0", cwd=tmp_path).status == 0
 
     page = page_of(tmp_path)
-    assert re.search(r"<h1>Roll of 80 frames</h1>.*<code>a\.csv, b\.csv</code>", page, re.DOTALL)
+    assert re.search(r"<h1>Roll of 80 frames</h1>.*<code>a\.csv, b\.csv</code>.*>rollcli a, b<", page, re.S)
     assert re.search(r'class="value">roll −[12]\.\d+ ± [\d.]+° <span>in m \(b\.csv\)</span>', page)
     assert "m (b.csv) differs from m (a.csv) by -" in page
 
