@@ -208,9 +208,12 @@ def picture(data: bytes) -> NDArray[Any]:
 
 def decode_mask(data: bytes) -> NDArray[Any]:
     """Return the pixels of a mask: grey (H, W) or BGR (H, W, 3), 0 where they are fully transparent."""
-    pixels = _decoded(data, cv2.IMREAD_UNCHANGED, mask=True)[-1]
-    has_alpha = pixels.ndim == 3 and pixels.shape[2] == 4
-    return np.where(pixels[..., 3:] > 0, pixels[..., :3], 0) if has_alpha else pixels
+    header, bodies, pixels = _decoded(data, cv2.IMREAD_UNCHANGED, mask=True)
+    if header.colour in (_GREY, _COLOUR) and (hole := bodies.get(b"tRNS")):
+        channels, spread = _CHANNELS[header.colour], 255 // (2**header.depth - 1) or 1  # as in `decode_png`
+        transparent = spread * np.frombuffer(hole.ljust(2 * channels, b"\0"), ">u2", channels)[::-1]
+        pixels[(np.atleast_3d(pixels) == transparent).all(axis=2)] = 0
+    return np.where(pixels[..., 3:] > 0, pixels[..., :3], 0) if pixels.shape[2:] == (4,) else pixels
 
 
 def encode_png(values: NDArray[Any], text: str = "") -> bytes:

@@ -8,7 +8,7 @@ import pytest
 
 from rollcli.errors import InputError
 from rollcli.files.codecs import png
-from rollcli.files.formats import decode_image, decode_stored
+from rollcli.files.formats import decode_image, decode_mask, decode_stored
 from tests.binary_files import disparity_map, flipped, make_png, png_file, png_header, png_rows
 from tests.run_cli import error_of
 
@@ -80,6 +80,7 @@ def test_the_grey_that_stands_for_transparent_is_no_data(depth):
 
     expected = np.where(values == hole, 0, values)
     np.testing.assert_array_equal(decode_stored(file, "x").values, expected)
+    np.testing.assert_array_equal(decode_mask(file, "x"), expected > 0)
 
 
 @pytest.mark.parametrize("layout", [{}, {"interlace": True}])
