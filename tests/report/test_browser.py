@@ -115,10 +115,13 @@ def test_a_click_enlarges_and_keys_move_on_and_close(opened):
     page = opened(drawn=False)
     button = page.locator(".pictures .picture.before").nth(1)
     small = button.locator("img").bounding_box()
+    # a frame of another result may have the same name
+    button.evaluate("it => it.dataset.caption = document.querySelector('.picture.before').dataset.caption")
     button.click()
     dialog = page.locator("dialog")
     assert dialog.is_visible()
     large = dialog.locator("img")
+    assert large.get_attribute("src") == button.locator("img").get_attribute("src")
     assert large.bounding_box()["height"] > 1.5 * small["height"]
     assert large.evaluate("image => image.complete && image.naturalWidth > 0")
     caption = dialog.locator("p").inner_text()

@@ -25,8 +25,8 @@
   });
   // also from a copy of the pictures, which the table shows
   document.addEventListener("click", event => {
-    const caption = event.target.closest(".picture")?.dataset.caption;
-    if (caption !== undefined) show(pictures.findIndex(each => each.dataset.caption === caption));
+    const { dataset, innerHTML } = event.target.closest(".picture") ?? {};
+    if (dataset) show(pictures.findIndex(each => each.dataset.caption === dataset.caption && each.innerHTML === innerHTML));
   });
   dialog.querySelectorAll("[data-step]").forEach(
     button => button.addEventListener("click", () => show(current + Number(button.dataset.step))));
