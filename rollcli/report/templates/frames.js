@@ -93,7 +93,7 @@
   window.addEventListener("resize", draw);
   window.addEventListener("hashchange", follow);
   document.addEventListener("drawn", ({ target }) => target.on("plotly_click", event => {
-    const place = each => places ? places.indexOf(each.x) : each.x - 1;
+    const place = each => places ? places[each.data.name === "failed" ? "lastIndexOf" : "indexOf"](each.x) : each.x - 1;
     const point = event.points.find(each => each.customdata && rows[place(each)]);
     if (point && target.id !== "histogram") open(place(point));
   }));
