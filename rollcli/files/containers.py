@@ -129,8 +129,8 @@ def members(path: str) -> Iterator[tuple[str, str]]:
     else:
         found = ((each.filename, "") for each in _zip(path).infolist() if not each.is_dir())
     for name, position in found:
-        if not any(part.startswith((".", "__MACOSX")) and part != ".." for part in name.split("/")):
-            yield f"{path}#{name}{position}", name
+        if not any(part.startswith((".", "__MACOSX")) and part.strip(".") for part in name.split("/")):
+            yield f"{path}#{name}{position}", name.removeprefix("./")
 
 
 def _tar_members(path: str) -> Iterator[tuple[str, str]]:

@@ -16,7 +16,7 @@ from rollcli.errors import InputError, about
 from rollcli.estimator.moments import usable_of
 from rollcli.files.codecs import arrays, pictures, png, tiff
 from rollcli.files.codecs.arrays import Stored as Stored
-from rollcli.files.containers import is_archive, members
+from rollcli.files.containers import is_archive, members, shown
 from rollcli.files.naming import listed
 from rollcli.files.storage import read_bytes, read_frame
 
@@ -63,7 +63,7 @@ def read_stored(path: str | Path, name: str | None = None, *, rgb: bool = False)
     """
     name = name or str(path)
     if is_archive(str(path)):  # of one that can be read, each member is a frame
-        inside = listed(f"{name}#{member}" for _, member in members(str(path)))
+        inside = listed(name + shown(each.removeprefix(str(path))) for each, _ in members(str(path)))
         raise InputError(f"{name}: is an archive; name one of its maps: {inside}")
     if rgb:
         data = read_bytes(path, name)
