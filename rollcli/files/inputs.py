@@ -124,7 +124,7 @@ def pair_inputs(
     if match == "order":
         if len(lefts) != len(rights):
             raise UsageError(f"{len(lefts)} left and {len(rights)} right images cannot be matched by order")
-    elif not len(lefts) == len(rights) == 1:
+    elif not (len(lefts) == len(rights) == 1 and {left, right} & {lefts[0].location, rights[0].location}):
         return _by_name(lefts, rights)
     pairs = list(zip(lefts, rights, strict=True))
     for one, here, there in zip(lefts, _places(lefts), _places(rights), strict=True):
