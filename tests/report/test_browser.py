@@ -115,6 +115,7 @@ def test_a_click_enlarges_and_keys_move_on_and_close(opened):
     page = opened(drawn=False)
     button = page.locator(".pictures .picture.before").nth(1)
     small = button.locator("img").bounding_box()
+    # a frame of another result may have the same name
     button.evaluate("it => it.dataset.caption = document.querySelector('.picture.before').dataset.caption")
     button.click()
     dialog = page.locator("dialog")

@@ -77,6 +77,7 @@ def test_the_grey_that_stands_for_transparent_is_no_data(depth):
     values = np.arange(40).reshape(5, 8) % 2**depth
     hole = 3 % 2**depth
     file = make_png(values, depth, extra=[(b"tRNS", struct.pack(">H", hole))])
+
     expected = np.where(values == hole, 0, values)
     np.testing.assert_array_equal(decode_stored(file, "x").values, expected)
     np.testing.assert_array_equal(decode_mask(file, "x"), expected > 0)
