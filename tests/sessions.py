@@ -28,6 +28,7 @@ from rollcli import __version__
 from rollcli.files.results import ALIGNMENT_COLUMNS, Row, format_header, format_row
 from tests.rig.drive.series import drive
 from tests.run_cli import contents, keep_rows, road_map, rollcli, write_kitti, write_maps, write_pair
+from tests.slow import mostly_slow
 
 _NUMBER = re.compile(r"(?<![\w.])[-+−]?\d+\.(\d+)(?:e([-+]\d+))?(?![\w.])")
 _TIMES = re.compile(r"[\d.]+ (?=s\b|frames/s|MB)")
@@ -325,5 +326,7 @@ _TOOLS = {
 
 
 def parametrize(package):
-    """Mark a test to be run with the heading of each session."""
-    return pytest.mark.parametrize("heading", sessions(package))
+    """Mark a test to be run with the heading of each session; those that draw charts take seconds."""
+    every = sessions(package)
+    quick = [each for each in every if "[plotly]" not in each]
+    return pytest.mark.parametrize("heading", mostly_slow(every, *quick))

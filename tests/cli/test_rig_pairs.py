@@ -85,6 +85,7 @@ def test_after_a_jump_the_correction_is_of_the_pairs_since(pairs):
     assert columns(pairs / "jump.json") == columns(pairs / "use.json")
 
 
+@pytest.mark.slow
 def test_the_error_of_depth_is_the_same_at_each_size_that_pairs_are_matched_at(pairs):
     given = ("--left", "left", "--right", "off", "--downscale", "2")
     assert rollcli("disparity", *given, "-o", "maps", "-q", cwd=pairs).status == 0
@@ -107,6 +108,7 @@ def test_the_error_of_depth_is_the_same_at_each_size_that_pairs_are_matched_at(p
         assert f"{errors[-1]:.1f} % at 10 m" in (pairs / f"{each}.html").read_text()
 
 
+@pytest.mark.slow
 def test_with_a_correction_the_angles_are_those_of_the_untouched_pairs(pairs):
     shutil.copy(pairs / "use.json", pairs / "again.json")
     given = ("--left", "left", "--right", "off", "--align", "again.json", "-o", "corrected.csv", "-q")

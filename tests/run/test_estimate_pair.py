@@ -84,6 +84,7 @@ def test_a_map_that_is_turned_upright_keeps_what_levelling_left_open(pair):
         assert [row[name] for name in ALIGNMENT_COLUMNS] == [of_pair[name] for name in ALIGNMENT_COLUMNS]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("percent", "share"), [(0.0, 0.95), (0.5, 0.8)])
 def test_where_the_right_camera_is_rolled_or_longer_the_interval_holds_the_pitch(percent, share):
     """The principal point lies 30 px off the middle: levelling moves all disparities by 0.16 px or 0.15."""

@@ -99,7 +99,8 @@ def test_a_pair_that_was_not_levelled_has_no_error_of_levelling(frame):
     assert match_pair(frame.left, lower, StereoOptions()).slope_error > 0
 
 
-@pytest.mark.parametrize("scene", mostly_slow(["open", "street"], "street"))
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", ["open", "street"])
 def test_a_yaw_is_taken_out_of_rows_and_columns(scene):
     off = []
     for seed in range(6):
@@ -187,6 +188,7 @@ def test_what_is_measured_at_half_size_is_in_pixels_of_that(frame):
     assert match.corrected.offset == pytest.approx(1.5, abs=0.1)
 
 
+@pytest.mark.slow
 def test_half_the_size_is_levelled_by_what_the_given_views_tell():
     off = []
     for spec in draw_specs(SimulateOptions(frames=12, size=(640, 480), seed=5, grey=True)):
