@@ -186,8 +186,10 @@ def recorded_calibrations(run: Mapping[str, Any] | None) -> list[Calibration]:
 
 
 def recorded_downscale(run: Mapping[str, Any] | None, name: str) -> float:
-    """Read back how much wider than maps their images were; earlier records have it of pairs alone."""
-    found = (run or {}).get("downscale", recorded_options(run, name).stereo.downscale)
+    """Read back how much wider than maps their images were."""
+    found = (run or {}).get("downscale")
+    if found is None:  # earlier records have it of pairs alone
+        found = recorded_options(run, name).stereo.downscale
     return float(found) if isinstance(found, int | float) and 1 <= found < 1e3 else 1.0
 
 

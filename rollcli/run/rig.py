@@ -240,8 +240,9 @@ def run_rig(options: RigOptions) -> int:
         missing, notes = missing or later, [*notes, *more]
         changes = {each.name: difference(rig.now(each), after.now(each), each) for each in QUANTITIES}
     calibration = calibration_finder(options.calibration)(rig.frames.files[-1])
-    last = options.results[-1]
-    downscale = recorded_downscale(results.read_run(last), results.run_path(last))
+    last, downscale = options.results[-1], 1.0
+    if calibration is not None:
+        downscale = recorded_downscale(results.read_run(last), results.run_path(last))
     health = health_of(rig, calibration, downscale)
     if calibration is not None and (health is None or calibration.baseline is None):
         lacks = "no pair was measured" if health is None else "it has no baseline"

@@ -44,6 +44,8 @@ def test_rig_says_the_drift_an_hour_in_words_and_in_json(tmp_path):
     assert found["drift_deg"] == pytest.approx(hourly * 598 / 3600, rel=1e-3)
     rollcli("report", "rolls.jsonl", "-o", "page.html", "--gallery", "0", cwd=tmp_path, status=0)
     assert "an hour" in (tmp_path / "page.html").read_text("utf-8")
+    (tmp_path / "rolls.jsonl.run.json").write_text('{"options": 3}')  # of use with a calibration alone
+    assert rollcli("rig", "rolls.jsonl", cwd=tmp_path, status=0).out == told.out
 
 
 @pytest.mark.parametrize(
