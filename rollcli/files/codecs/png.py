@@ -5,7 +5,7 @@ import os
 import struct
 import tempfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -183,19 +183,17 @@ def decode_png(data: bytes) -> Stored:
     A palette of greys stands for its greys; fully transparent pixels hold no data and become 0.
     """
     header, bodies, pixels = _decoded(data, cv2.IMREAD_UNCHANGED)
-    transparent = bodies.get(b"tRNS", b"")
     if header.colour == _GREY:
-        if header.depth < 8:  # which OpenCV spreads over 0..255
-            pixels //= 255 // (2**header.depth - 1)
-        if transparent:
-            pixels[pixels == int.from_bytes(transparent, "big")] = 0
+        _clear_hole(header, bodies, pixels)
+        if header.depth < 8:
+            pixels //= _spread(header)
     elif header.colour in (_COLOUR, _COLOUR_ALPHA):
         raise InputError(f"is a colour image ({_CHANNELS[header.colour]} channels); {COLOUR_REMEDY}")
     else:
         grey = np.ascontiguousarray(pixels[..., 0])
         if header.colour == _PALETTE and (pixels[..., :3] != grey[..., None]).any():
             raise InputError(f"is a colour image (a palette); {COLOUR_REMEDY}")
-        if header.colour == _GREY_ALPHA or transparent:
+        if header.colour == _GREY_ALPHA or bodies.get(b"tRNS"):
             grey[pixels[..., -1] == 0] = 0
         pixels = grey
     return Stored(pixels, "png", text=bodies.get(_TEXT_KEY, b"").decode("latin-1"))
@@ -209,11 +207,27 @@ def picture(data: bytes) -> NDArray[Any]:
 def decode_mask(data: bytes) -> NDArray[Any]:
     """Return the pixels of a mask: grey (H, W) or BGR (H, W, 3), 0 where they are fully transparent."""
     header, bodies, pixels = _decoded(data, cv2.IMREAD_UNCHANGED, mask=True)
-    if header.colour in (_GREY, _COLOUR) and (hole := bodies.get(b"tRNS")):
-        channels, spread = _CHANNELS[header.colour], 255 // (2**header.depth - 1) or 1  # as in `decode_png`
-        transparent = spread * np.frombuffer(hole.ljust(2 * channels, b"\0"), ">u2", channels)[::-1]
-        pixels[(np.atleast_3d(pixels) == transparent).all(axis=2)] = 0
+    if header.colour in (_GREY, _COLOUR):
+        _clear_hole(header, bodies, pixels)
     return np.where(pixels[..., 3:] > 0, pixels[..., :3], 0) if pixels.shape[2:] == (4,) else pixels
+
+
+def _spread(header: _Header) -> int:
+    """Return by how much OpenCV spreads greys of few bits, over 0..255."""
+    return 255 // (2**header.depth - 1) or 1
+
+
+def _clear_hole(header: _Header, bodies: Mapping[bytes, bytes], pixels: NDArray[Any]) -> None:
+    """Set the pixels of the grey or colour to 0 that tRNS makes transparent."""
+    hole, channels = bodies.get(b"tRNS", b""), _CHANNELS[header.colour]
+    if not hole:
+        return
+    each = len(hole) // channels
+    transparent = np.ones(pixels.shape[:2], np.bool_)
+    for place in range(channels):  # OpenCV has the red last
+        value = int.from_bytes(hole[place * each : (place + 1) * each], "big")
+        transparent &= np.atleast_3d(pixels)[..., channels - 1 - place] == _spread(header) * value
+    pixels[transparent] = 0
 
 
 def encode_png(values: NDArray[Any], text: str = "") -> bytes:
