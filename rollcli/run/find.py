@@ -414,12 +414,13 @@ def _in_bags(bags: _Bags, options: FramesOptions) -> Iterator[_Named]:
         known, given = bag.calibration, options.calibration
         options.running.note(*bag.notes, *([] if given.given else bag.uncalibrated))
         known = None if known is None or given.calib else with_numbers(known, given)
-        of = calibration_finder(given) if given.calib else None
+        if not (bag.has_doffs and given.calib and given.doffs is None):
+            yield from ((*views, known) for views in bag.frames)
+            continue
+        calibration_of = calibration_finder(given)
         for views in bag.frames:
-            camera = of(views[0].name) if of else known
-            if camera is not None and bag.has_doffs and given.doffs is None:
-                camera = replace(camera, doffs=0.0)
-            yield (*views, camera)
+            own = calibration_of(views[0].name)
+            yield (*views, own and replace(own, doffs=0.0))
 
 
 def _frame_maker(options: FramesOptions) -> Callable[..., Frame]:
