@@ -356,7 +356,7 @@ def run_accuracy(options: AccuracyOptions) -> ExitStatus:
 
 def _heights(read: Result, known: Mapping[str, KnownPose], options: AccuracyOptions) -> dict[int, Accuracy]:
     """Compare the heights over the road of a folder that was named, or of that of the run."""
-    heights, beside = options.heights, os.path.dirname(options.truth) or "."  # noqa: PTH120
+    heights, beside = options.heights, os.path.dirname(options.truth) or "."  # noqa: PTH120 (also of a URL)
     if heights is None:
         heights = recorded_options(read.run, run_path(options.result)).images.heights
         if heights is None or not (is_folder(heights) and is_folder(f"{beside}/heights")):

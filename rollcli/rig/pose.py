@@ -121,7 +121,7 @@ def with_pose(estimate: RollEstimate, calibration: Calibration) -> RollEstimate:
 def turns_of(theta: float, calibration: Calibration) -> float:
     """Return by how much more than the image the rig turns: tan(roll) = fx / fy tan(theta).
 
-    So much nearer, too, a place to the side of the road is than square pixels would have it.
+    A place beside the road is nearer to its middle by the same factor than it would be with square pixels.
     """
     ratio = calibration.fy / calibration.fx
     return ratio / (ratio**2 * math.cos(theta) ** 2 + math.sin(theta) ** 2)

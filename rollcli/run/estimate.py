@@ -94,8 +94,9 @@ def _run_step(step: Step, plan: Plan, output: Output, progress: Progress, stop: 
     # whichever folder it is resumed from
     result = plan.output if is_url(plan.output) else os.path.realpath(plan.output)
     retry_of = result if step.retries else ""
-    told = options.frame._replace(replaces=record.replaces, retry_of=retry_of, run=record.run)
-    told = told._replace(notes=bool(plan.files))
+    told = options.frame._replace(
+        replaces=record.replaces, retry_of=retry_of, run=record.run, notes=bool(plan.files)
+    )
     rows = BatchOptions(options.result, plan.further, told, options.running.verbose, parts)
     join, unit = partial(join_results, options=rows), parts.rows if parts else 1
     work = work_on(step.frames, told, join=join, tell=lambda: record.read_as, unit=unit)

@@ -244,10 +244,10 @@ def _reopen(descriptor: int, path: str, flags: int) -> None:
 
 _PART_ENDING = "inputs"
 _HEX = 16
-_HERE = FrameOptions()
 _WIDTH = 3 * (_HEX + 1)
 _UNKNOWN = b"-" * _HEX
 _LINE = re.compile(rb"([0-9a-f]{16} )([0-9a-f]{16}|-{16}) ([0-9a-f]{16}|-{16})\n")
+_HERE = FrameOptions()  # paths are those of this machine
 
 
 def inputs_path(result: str) -> str:
@@ -285,7 +285,7 @@ def inputs_line(frame: Frame, notes: Mapping[str, Note], options: FrameOptions =
     notes : mapping from str to Note
         What was read for it, by location.
     options : FrameOptions
-        Locate a path of the frame on this machine.
+        They locate the frame's paths on this machine, and name the run.
     """
     found = []
     for path in frame.reads():

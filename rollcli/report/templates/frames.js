@@ -93,7 +93,11 @@
   window.addEventListener("resize", draw);
   window.addEventListener("hashchange", follow);
   document.addEventListener("drawn", ({ target }) => target.on("plotly_click", event => {
-    const place = each => places ? places[each.data.name === "failed" ? "lastIndexOf" : "indexOf"](each.x) : each.x - 1;
+    const place = each => {
+      if (!places) return each.x - 1;
+      // the rest of a broken recording has the time of the frame before it
+      return each.data.name === "failed" ? places.lastIndexOf(each.x) : places.indexOf(each.x);
+    };
     const point = event.points.find(each => each.customdata && rows[place(each)]);
     if (point && target.id !== "histogram") open(place(point));
   }));
