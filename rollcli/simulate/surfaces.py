@@ -126,9 +126,7 @@ class Ground(Surface):
         lowest, highest = (
             replace(self, offset=self.offset + raised, relief=None) for raised in self.relief.span
         )
-        # a low camera stands below the highest ground
-        begin = np.where(highest._above(origin) > 0, np.nan, NEAR)
-        first = np.fmax(highest._first_smooth_hit(origin, direction), begin)
+        first = highest._entered(origin, direction)
         last = np.fmax(first, lowest._first_smooth_hit(origin, direction))
         ends = [origin + t * direction for t in (first, last)]
         sides, ahead = [self.course.lateral(end) for end in ends], [end[2] for end in ends]
@@ -148,6 +146,10 @@ class Ground(Surface):
         smooth = self.offset + self.slope * lateral + cambered
         uneven = self.relief.height(lateral, points[2]) if self.relief else 0.0
         return np.asarray(self.course.elevation(points) - smooth - uneven)
+
+    def _entered(self, origin: Array, direction: Array) -> Array:
+        """Return where rays first are below a smooth sheet, as a low camera is; nan where they miss it."""
+        return np.where(self._above(origin) > 0, self._first_smooth_hit(origin, direction), NEAR)
 
     def _first_smooth_hit(self, origin: Array, direction: Array) -> Array:
         """Return the same for the sheet without its relief."""
@@ -171,7 +173,7 @@ class Ground(Surface):
         laterals = np.clip([-np.inf, 0.0, np.inf], self.edges[0], self.edges[-1])
         rises = (self.camber / 2 * laterals**2).tolist()
         highest, lowest = (replace(plain, offset=self.offset + rise) for rise in (max(rises), min(rises)))
-        first = np.where(highest._above(origin) > 0, highest._first_smooth_hit(origin, direction), NEAR)
+        first = highest._entered(origin, direction)
         with np.errstate(divide="ignore"):
             end = np.where(direction[2] > 0, (self.far - origin[2]) / direction[2], _FARTHEST)
         # over a crest a ray may miss the lowest, and leaves the highest again: where it meets it backwards
