@@ -35,6 +35,7 @@ DOORS = {
     "rollcli.run.progress": "loads NumPy only at the end of a run, to tell the rig's roll",
     "rollcli.run.workers.pool": "a worker's door",
     "rollcli.run.workers.tasks": "loads the executor that is used; the cluster is an extra",
+    "rollcli.stereo.correction": "the command line's help needs no files",
 }
 DOOR_PACKAGES = {"rollcli.cli": "the command line's doors: help and version load no command"}
 # what is filled in while it is made

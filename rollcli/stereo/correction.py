@@ -7,9 +7,6 @@ from dataclasses import asdict, astuple, replace
 from typing import Any, NamedTuple
 
 from rollcli.errors import UsageError, as_usage, reading
-from rollcli.files.bounded import MOST_SETTINGS, read_given
-from rollcli.files.storage import read_bytes
-from rollcli.files.stores.locations import is_url
 from rollcli.rig.quantities import ALIGNMENT
 from rollcli.stereo.misalignment import ColumnSupport, Misalignment
 
@@ -110,6 +107,10 @@ def read_correction(path: str) -> Correction:
     UsageError
         The file cannot be read, or is no correction.
     """
+    from rollcli.files.bounded import MOST_SETTINGS, read_given
+    from rollcli.files.storage import read_bytes
+    from rollcli.files.stores.locations import is_url
+
     try:
         with as_usage(), reading(f"--align {path}"):
             # not by `read_named`, for which "-" is standard input: workers have none
