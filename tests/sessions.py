@@ -4,8 +4,8 @@
 it stand the exit status, standard error (``!``) and output (``>``), and which files came (``+``), changed
 (``~``) and went (``-``). ``python -m tests.recorded`` writes all of that anew. A session begins in a folder
 with maps, pairs, masks and a calibration; beside ``rollcli`` it knows the tools below, and ``| fields NAME``
-shows columns of a CSV. A heading ends with the package that its session needs, in brackets. Run times are
-left out, and numbers may differ in their last digit.
+shows columns of a CSV. A heading ends with the package that its session needs, in brackets; of more than a
+second, it says (slow). Run times are left out, and numbers may differ in their last digit.
 """
 
 import contextlib
@@ -328,5 +328,5 @@ _TOOLS = {
 def parametrize(package):
     """Mark a test to be run with the heading of each session; those that draw charts take seconds."""
     every = sessions(package)
-    quick = [each for each in every if "[plotly]" not in each]
+    quick = [each for each in every if "(slow)" not in each and "[plotly]" not in each]
     return pytest.mark.parametrize("heading", mostly_slow(every, *quick))

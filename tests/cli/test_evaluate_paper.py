@@ -12,6 +12,8 @@ from rollcli.run.workers import tasks as run_tasks
 from tests.estimator.synthetic_maps import bent_road
 from tests.run_cli import contents, interrupt_in, rollcli, rows_of
 
+pytestmark = pytest.mark.slow
+
 FAST = ("--turns", "-8:8:8", "--timed", "1")
 
 for each in ("plotly", "jinja2", "matplotlib"):
@@ -48,7 +50,6 @@ def test_a_map_that_cannot_be_read_is_named_and_ends_it_with_3(done):
     assert "maps/empty.npy: " in (folder / "out" / PAGE).read_text()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["svg", "pdf"])
 def test_each_chart_is_a_figure_as_wide_as_a_column_too(tmp_path, kind):
     write_maps(tmp_path / "maps", "a.npy")
@@ -68,7 +69,6 @@ def test_the_page_needs_no_network_and_shows_file_names_as_text(done):
     assert "<script" not in page
 
 
-@pytest.mark.slow
 def test_the_tables_do_not_depend_on_the_workers(done, tmp_path):
     folder, _ = done
     shutil.copytree(folder / "maps", tmp_path / "maps")
@@ -77,7 +77,6 @@ def test_the_tables_do_not_depend_on_the_workers(done, tmp_path):
         assert (tmp_path / f"out/{name}.csv").read_bytes() == (folder / f"out/{name}.csv").read_bytes()
 
 
-@pytest.mark.slow
 def test_every_chart_is_drawn_in_a_browser_without_an_error(done, open_page):
     page = open_page((done[0] / "out" / PAGE).as_uri())
     for each in range(5):

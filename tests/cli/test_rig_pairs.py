@@ -12,6 +12,8 @@ import pytest
 from tests.odd_views import seen_by, seen_turned
 from tests.run_cli import rollcli, rows_of
 
+pytestmark = pytest.mark.slow
+
 TRUTH = {"right_lower_px": 1.2, "right_clockwise_deg": 0.15, "right_larger_percent": 0.3}
 NEAR = {"right_lower_px": 0.1, "right_clockwise_deg": 0.02, "right_larger_percent": 0.05}
 
@@ -85,7 +87,6 @@ def test_after_a_jump_the_correction_is_of_the_pairs_since(pairs):
     assert columns(pairs / "jump.json") == columns(pairs / "use.json")
 
 
-@pytest.mark.slow
 def test_the_error_of_depth_is_the_same_at_each_size_that_pairs_are_matched_at(pairs):
     given = ("--left", "left", "--right", "off", "--downscale", "2")
     assert rollcli("disparity", *given, "-o", "maps", "-q", cwd=pairs).status == 0
@@ -108,7 +109,6 @@ def test_the_error_of_depth_is_the_same_at_each_size_that_pairs_are_matched_at(p
         assert f"{errors[-1]:.1f} % at 10 m" in (pairs / f"{each}.html").read_text()
 
 
-@pytest.mark.slow
 def test_with_a_correction_the_angles_are_those_of_the_untouched_pairs(pairs):
     shutil.copy(pairs / "use.json", pairs / "again.json")
     given = ("--left", "left", "--right", "off", "--align", "again.json", "-o", "corrected.csv", "-q")

@@ -65,7 +65,7 @@ def places(store, tmp_path_factory):
         yield folder, bucket
 
 
-@pytest.mark.parametrize("what", mostly_slow(LINES, "folders", "derotate", "rig", "report"))
+@pytest.mark.parametrize("what", mostly_slow(LINES, "folders", "rig"))
 def test_a_url_works_as_a_path_does(places, store, what):
     folder, bucket = places
     if "report" in what:

@@ -19,6 +19,7 @@ from rollcli.files.results import read_result
 from rollcli.report import pictures
 from tests.report.results import row, write_result
 from tests.run_cli import interrupt_in, road_map, rollcli, write_kitti, write_maps
+from tests.slow import mostly_slow
 
 pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
 pytest.importorskip("jinja2", reason="jinja2, of the extra report, is not here")
@@ -95,7 +96,7 @@ def test_the_summary_says_options_version_counts_and_the_sign(folder):
     assert f"result written {written:%Y-%m-%d %H:%M} UTC" in text
 
 
-@pytest.mark.parametrize("images", ["out", "out/upright", "out/v"])
+@pytest.mark.parametrize("images", mostly_slow(["out", "out/upright", "out/v"], "out"))
 def test_pictures_come_from_the_images_that_estimate_wrote(folder, images):
     shutil.rmtree(folder / "maps")
     done = report(folder, "out/rolls.csv", "--images", images)
@@ -222,6 +223,7 @@ def test_heights_are_shown_as_estimate_drew_them_or_made_in_the_same_colours(tmp
         assert off < 4  # WebP loses a little
 
 
+@pytest.mark.slow
 def test_a_derotated_map_of_depths_is_shown_in_pixels_or_not_at_all(tmp_path):
     np.save(tmp_path / "a.npy", 50 / road_map())
     rig = ["--focal", "100", "--principal-point", "80,9", "--baseline", "0.5", "--encoding", "depth"]

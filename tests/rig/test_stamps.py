@@ -27,6 +27,7 @@ def rows(count=600, rate=RATE, name=NAME, start=START, every_s=1.0):
     ]
 
 
+@pytest.mark.slow
 def test_rig_says_the_drift_an_hour_in_words_and_in_json(tmp_path):
     from rollcli.files.results import format_row
 

@@ -135,6 +135,7 @@ def interrupted_at(step, work):
     return False
 
 
+@pytest.mark.slow
 def test_a_second_interrupt_at_any_line_writes_no_row_twice_and_leaves_none_out(tmp_path):
     expected, step, came = [b"%d\n" % number for number in range(6)], 0, True
     plan = plan_of(tmp_path, len(expected))

@@ -29,7 +29,8 @@ from tests.run_cli import (
     wait_until,
     write_maps,
 )
-from tests.slow import mostly_slow
+
+pytestmark = pytest.mark.slow
 
 FRAMES = 12
 
@@ -41,13 +42,13 @@ def one_line(done):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
-@pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
+@pytest.mark.parametrize("jobs", ["1", "2"])
 def test_a_full_device_ends_the_run_with_status_1(maps, jobs):
     done = rollcli("estimate", "maps", "-o", "/dev/full", "-q", "-j", jobs, cwd=maps, status=1)
     assert "/dev/full: cannot be written: no space left on device" in one_line(done)
 
 
-@pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
+@pytest.mark.parametrize("jobs", ["1", "2"])
 def test_a_result_that_may_not_grow_keeps_its_whole_rows_and_is_resumed_later(maps, jobs):
     write_maps(maps / "maps", 40)
     arguments = ("estimate", "maps", "-o", "rolls.csv", "-q", "-j", jobs)
@@ -69,7 +70,7 @@ def test_a_result_that_may_not_grow_keeps_its_whole_rows_and_is_resumed_later(ma
     assert (maps / "rolls.csv").read_bytes() == whole
 
 
-@pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
+@pytest.mark.parametrize("jobs", ["1", "2"])
 def test_a_full_disk_of_images_keeps_the_rows_before_it(maps, jobs):
     disk = maps / "disk"
     disk.mkdir()
@@ -94,7 +95,6 @@ def test_a_full_disk_of_images_keeps_the_rows_before_it(maps, jobs):
         subprocess.run(["umount", disk], check=True)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("jobs", "moved"), [("1", True), ("2", False)])
 def test_a_result_that_is_moved_or_removed_while_running_ends_the_run_with_status_1(maps, jobs, moved):
     write_maps(maps / "maps", 300)
@@ -111,7 +111,7 @@ def test_a_result_that_is_moved_or_removed_while_running_ends_the_run_with_statu
     assert not result.exists()
 
 
-@pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
+@pytest.mark.parametrize("jobs", ["1", "2"])
 def test_a_closed_pipe_ends_the_run_quietly(maps, jobs):
     run = started("estimate", "maps", "-j", jobs, "-q", cwd=maps, stdout=subprocess.PIPE)
     run.stdout.readline()
@@ -152,7 +152,6 @@ def run_with_deaths(maps, deadly, times, arguments=ESTIMATE):
     return rollcli(*arguments, cwd=maps, **hooked(maps, hook))
 
 
-@pytest.mark.slow
 def test_a_worker_that_dies_once_costs_nothing(maps):
     rollcli("estimate", "maps", "-o", "undisturbed.csv", "-q", cwd=maps)
     done = run_with_deaths(maps, ["frame3", "frame8"], 1)
@@ -173,7 +172,6 @@ def test_a_frame_that_kills_its_worker_twice_is_an_error_row_and_the_batch_goes_
     ]
 
 
-@pytest.mark.slow
 def test_a_map_that_kills_its_worker_twice_is_not_derotated_and_the_others_are(maps):
     (maps / "out").mkdir()
     (maps / "out" / "frame3.png").write_text("of an earlier run")
@@ -209,7 +207,6 @@ WRITE_IMAGES = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "after"), [*((each, False) for each in WRITE_IMAGES), ("estimate", True)])
 def test_a_worker_that_dies_while_it_writes_an_image_leaves_nothing_behind(maps, name, after):
     frame, line = WRITE_IMAGES[name]
@@ -248,7 +245,6 @@ def test_a_worker_that_cannot_load_its_libraries_ends_the_run_in_one_line(maps):
     assert "cv2" in cannot_start(maps, env=hooked(maps, "import sys\nsys.modules['cv2'] = None\n"))
 
 
-@pytest.mark.slow
 def test_workers_end_with_a_run_that_is_killed_also_in_the_middle_of_a_frame(maps):
     how = {"env": holding(maps, "frame8"), "stderr": None, "start_new_session": True}
     run = started(*ESTIMATE, cwd=maps, **how)
@@ -274,7 +270,6 @@ def test_the_row_of_a_frame_without_memory_says_so():
     assert (row.status, row.message) == ("error", "out of memory")
 
 
-@pytest.mark.slow
 def test_a_run_with_a_call_that_fails_is_resumed_to_the_same_bytes():
     # in a process of its own: a fork of this one would lack the threads that OpenCV may have started here
     line = [sys.executable, "-m", "tests.fuzz.faults", "40"]

@@ -11,7 +11,6 @@ import pytest
 from rollcli.files.results import parse_rows
 from rollcli.run.result_file import whole_rows
 from tests.run_cli import contents, ended, environment, estimated, rollcli, started, wait_until, write_program
-from tests.slow import mostly_slow
 
 FRAMES = 40
 IMAGES = ("--derotated", "upright", "--vdisparity", "v")
@@ -65,7 +64,8 @@ def test_a_run_killed_again_and_again_ends_in_the_same_bytes_and_leaves_nothing_
     assert results(folder) == results(undisturbed)
 
 
-@pytest.mark.parametrize("jobs", mostly_slow([1, 2], 2))
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", [1, 2])
 def test_ctrl_c_keeps_what_is_done_and_prints_the_command_that_resumes(undisturbed, folder, jobs):
     run = start(folder, "-j", str(jobs))
     wait_for_images(folder, 4, run)
@@ -157,6 +157,7 @@ def workers_of(run):
     return [pid for pid, args in children.items() if "resource_tracker" not in args]
 
 
+@pytest.mark.slow
 def test_a_second_run_on_the_same_result_is_refused(folder, monkeypatch):
     monkeypatch.setattr("rollcli.files.locking._PATIENCE_S", 0.1)
     first = start(folder, "-j1")

@@ -24,6 +24,7 @@ from tests.run_cli import (
     write_kitti,
     write_maps,
 )
+from tests.slow import mostly_slow
 
 FRAMES = 12
 
@@ -71,7 +72,7 @@ def assert_is_as_anew(folder, line):
     assert contents(kept) == contents(folder, without=("maps/", "kept/"))
 
 
-@pytest.mark.parametrize("result", ["rolls.csv", "rolls.jsonl", "rolls.parquet"])
+@pytest.mark.parametrize("result", mostly_slow(["rolls.csv", "rolls.jsonl", "rolls.parquet"], "rolls.csv"))
 def test_frames_whose_files_were_mended_end_in_the_bytes_of_a_run_without_failures(folder, maps, result):
     if result.endswith("parquet"):
         pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
@@ -166,7 +167,7 @@ def test_a_link_to_a_result_stays_one_and_its_file_keeps_its_rights(folder, maps
     assert b"error" not in (folder / "rolls.csv").read_bytes()
 
 
-@pytest.fixture(params=["rolls.csv", "rolls.parquet", "bucket"])
+@pytest.fixture(params=mostly_slow(["rolls.csv", "rolls.parquet", "bucket"], "rolls.csv"))
 def stopped(request, folder, maps, monkeypatch):
     """A folder, and the line of a run whose retry made images and could not write their rows."""
     if request.param == "rolls.parquet":
@@ -245,6 +246,7 @@ def same(link, path):
         return False
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="needs /proc, which lists open files")
 def test_rows_are_replaced_and_the_result_stays_locked_and_grows(path):
     with open_result(str(path)) as file:

@@ -53,7 +53,7 @@ def anew(folder, tmp_path_factory, result):
     return written(other)
 
 
-@pytest.mark.parametrize("form", ["csv", "parquet"])
+@pytest.mark.parametrize("form", mostly_slow(["csv", "parquet"], "csv"))
 def test_a_resume_of_parts_takes_identical_bytes_with_other_times_and_no_others(folder, request, form):
     if form == "parquet":
         pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")

@@ -112,7 +112,7 @@ def test_parts_of_several_workers_are_the_file_of_one_process(maps, bucket, rows
     assert len(list_names(f"{bucket}/{rows}.csv")) == -(-23 // int(rows))
 
 
-@pytest.mark.parametrize("missing", [[0], [1, 2, 5], [0, 11], range(12)])
+@pytest.mark.parametrize("missing", mostly_slow([[0], [1, 2, 5], [0, 11], range(12)], [1, 2, 5]))
 @pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
 def test_a_resume_does_the_parts_that_are_missing_wherever_they_are_and_no_others(maps, missing, jobs):
     pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
@@ -147,6 +147,7 @@ def test_parts_are_missing_in_a_bucket_too_the_first_one_of_csv_among_them(maps,
     assert joined(f"{bucket}/rolls.csv") == (maps / "rolls.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_hole_is_filled_before_a_failed_frame_of_a_later_part_is_done_again(maps, bucket):
     line = ("estimate", "maps", "-o", f"{bucket}/rolls.csv", "--part-rows", "3", "-q")
     assert rollcli(*line, cwd=maps).status == 3

@@ -10,6 +10,7 @@ from rollcli.simulate.road import draw_carriageway
 from rollcli.simulate.scene import draw_light
 from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Ground
+from tests.slow import mostly_slow
 from tests.true_disparity import true_disparity
 
 SMALL = {"size": (320, 240), "focal": 186.0, "crossfall": 0.04}
@@ -85,7 +86,7 @@ def marched_disparity(spec, road, u, v):
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("gutter", [0.0, 0.08])
+@pytest.mark.parametrize("gutter", mostly_slow([0.0, 0.08], 0.08))
 @pytest.mark.parametrize(
     ("seed", "roll_deg", "pitch_deg", "curvature"),
     [(BENT, 0.0, 2.0, 0.0), (BENT, 7.0, 4.0, 0.001), (STRAIGHT, -25.0, 1.0, -0.001)],

@@ -159,6 +159,7 @@ def test_what_a_map_of_an_empty_road_hides_is_found_or_doubted(empty_road, large
     assert match.doubt or off <= (found.ci95 if larger_percent else math.radians(0.1))
 
 
+@pytest.mark.slow
 def test_rows_that_are_bent_alone_are_seldom_taken_for_a_scale_without_a_word():
     """Of 48 such roads 37 are doubted, or their interval holds the truth."""
     told = 0

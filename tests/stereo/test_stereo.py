@@ -25,6 +25,11 @@ def street():
     return render_frame(FrameSpec(scene="street", roll=math.radians(4), size=(320, 240), seed=3))
 
 
+@pytest.fixture(scope="module")
+def large_street():
+    return render_frame(FrameSpec(scene="street", roll=math.radians(2), seed=5, colour=False))
+
+
 @pytest.mark.parametrize("mode", ["3way", "sgbm", "hh"])
 def test_a_shifted_image_gives_its_shift(mode):
     left, right = pair_at(23)
@@ -150,12 +155,11 @@ def test_a_rendered_street_is_matched_as_it_is(street):
         ({}, 25, False),
     ],
 )
-def test_a_correction_that_no_rig_in_use_needs_is_doubted(lies, noise, doubted):
-    frame = render_frame(FrameSpec(scene="street", roll=math.radians(2), seed=5, colour=False))
+def test_a_correction_that_no_rig_in_use_needs_is_doubted(large_street, lies, noise, doubted):
     rng = np.random.default_rng(0)
     left, right = (
         np.clip(view + rng.normal(0, noise, view.shape), 0, 255).astype(np.uint8)
-        for view in (frame.left, seen_by(frame.right, **lies))
+        for view in (large_street.left, seen_by(large_street.right, **lies))
     )
     assert ("too far from level" in match_pair(left, right, StereoOptions()).doubt) == doubted
 

@@ -11,7 +11,7 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.simulate.spec import FrameSpec
 from tests.estimator.road.test_surface import CAMERA_HEIGHT, disparity_of
-from tests.slow import repeatable
+from tests.slow import mostly_slow, repeatable
 from tests.true_disparity import true_disparity
 
 
@@ -32,7 +32,7 @@ def replaced(disparity, share, seed=0):
 
 
 @pytest.mark.parametrize(("share", "most_deg"), [(0.0, 0.02), (0.3, 0.05), (0.5, 0.1), (0.67, 0.15)])
-@pytest.mark.parametrize("scene", ["street", "verge"])
+@pytest.mark.parametrize("scene", mostly_slow(["street", "verge"], "street"))
 def test_a_share_of_noise_moves_the_angle_by_so_much_at_most(scene, share, most_deg):
     for roll_deg in (-20, -3, 0, 9):
         off = angle_deg(replaced(street(roll_deg, scene=scene), share)) - roll_deg

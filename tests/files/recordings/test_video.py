@@ -194,6 +194,7 @@ def test_a_video_that_was_cut_by_its_edit_list_has_the_frames_that_it_shows(tmp_
     assert (len(rows(done.out)), shown < COUNT) == (shown, True)
 
 
+@pytest.mark.slow
 def test_a_pair_of_videos_of_which_one_is_cut_off_uses_what_both_have(tmp_path, drive):
     for side, name in enumerate(("a.avi", "b.avi")):
         write_video(tmp_path / name, [each[side] for each in drive[2]], "FFV1")
@@ -215,6 +216,7 @@ def test_a_pair_of_videos_of_which_one_is_cut_off_uses_what_both_have(tmp_path, 
         assert (again.status, len(rows(again.out)), rows(again.out)[-1]) == (3, len(found), found[-1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["drive.mkv", "drive.mp4"])
 def test_an_interrupted_run_over_a_video_is_resumed_to_the_same_bytes(tmp_path, drive, name):
     path = write_video(tmp_path / name, beside(drive[2]), "MJPG")

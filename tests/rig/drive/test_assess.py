@@ -5,6 +5,7 @@ import pytest
 
 from rollcli.rig.drive.quantity import assess_sequence
 from tests.rig.drive.series import drive
+from tests.slow import mostly_slow
 
 SEEDS = range(4)
 
@@ -20,7 +21,7 @@ def test_a_stable_drive_has_an_interval_that_holds_and_neither_jumps_nor_drift()
     assert jumps <= 2
 
 
-@pytest.mark.parametrize("gap", [0, 300])  # frames before it that have no angle
+@pytest.mark.parametrize("gap", mostly_slow([0, 300], 300))  # frames before it that have no angle
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_jump_is_found_with_its_size_and_the_rig_is_as_it_is_after_it(seed, gap):
     values, errors = drive(seed, jump=0.8, at=1200, sd=0.1)
