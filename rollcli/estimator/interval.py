@@ -169,7 +169,8 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
         columns=changes[tuning.groups :, :_CAMBER],
         white=white[:4, :4],
         freedom=(_freedom(bands), _freedom(columns)),
-        uneven=uneven / math.sqrt(width_at_1 / nearest),
+        # turned so far, as by half a turn, the model may be seen nowhere: then nothing is known
+        uneven=uneven / math.sqrt(width_at_1 / nearest) if nearest > 0 else math.inf,
         hidden=width_at_1 * (1 / in_lane - 1 / max(border, in_lane)),
         bend=abs(model.camber * float(bulge[_THETA])),
         camber=_camber(model, prior_share, changes[:, _CAMBER]) if cambered else None,

@@ -229,6 +229,12 @@ def test_without_each_group_all_parameters_are_those_of_a_least_squares_fit(case
         assert freedom == pytest.approx(1 / np.sum(leverage**2) - 1, rel=1e-6)
 
 
+def test_of_a_road_that_is_seen_nowhere_the_interval_is_that_of_all_rolls():
+    surface = dataclasses.replace(fitted()[0].surface, model=RoadModel(0.0, (-90.0, 60.0, 9.0)))
+    found = interval_of(jackknife(surface, 0.0, TUNING.interval), 0.0, 0.0, TUNING.interval)
+    assert found.half_width == math.pi / 2
+
+
 def test_the_unevenness_of_waves_is_theirs_and_that_of_noise_is_none():
     rng = np.random.default_rng(3)
     rows, columns = np.mgrid[:300, :400].astype(float)
