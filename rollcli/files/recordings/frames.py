@@ -22,7 +22,7 @@ from rollcli.rig.calibration import Calibration
 _VIEWS = (IMAGE, COMPRESSED)
 _RAW = "image_raw"
 _SIDES = ("left", "right")
-_NO_P = "no CameraInfo with a principal point (P): no pitch and no height without --calib"
+_NO_P = "no CameraInfo with a principal point (P) in the image: no pitch and no height without --calib"
 _NO_LEFT = "no CameraInfo of the left view, but with a negative Tx: no pitch and no height without --calib"
 
 

@@ -61,9 +61,15 @@ class CameraInfo:
     p: tuple[float, ...]
 
     @property
-    def usable(self) -> bool:
+    def has_p(self) -> bool:
         """Whether P is there: drivers that were not calibrated write zeros."""
         return all(map(math.isfinite, self.p)) and self.p[0] > 0 and self.p[5] > 0
+
+    @property
+    def usable(self) -> bool:
+        """Whether P is a calibration: a region of the image need not hold the principal point."""
+        inside = 0 < self.p[2] < (self.width or math.inf) and 0 < self.p[6] < (self.height or math.inf)
+        return self.has_p and inside
 
     @property
     def across(self) -> float:
@@ -74,7 +80,7 @@ class CameraInfo:
     def changes_raw_views(self) -> bool:
         """Whether a raw view is not the rectified one."""
         upright = np.allclose(self.r, np.eye(3).ravel(), rtol=0, atol=1e-9)
-        return self.usable and self.k[0] > 0 and (any(self.d) or (not upright and any(self.r)))
+        return self.has_p and self.k[0] > 0 and (any(self.d) or (not upright and any(self.r)))
 
 
 def stamp_of(topic: Topic, data: memoryview, log_time: int) -> int:
@@ -105,11 +111,18 @@ def check_decoder(topic: Topic) -> None:
 
 
 def camera_info(topic: Topic, data: memoryview) -> CameraInfo:
-    """Decode a CameraInfo."""
+    """Decode a CameraInfo; of a camera that sends a region of its image, that of the region."""
     found = _decoded(topic, data)
     keys = "DKRP" if topic.encoding == "ros1" else "dkrp"  # ROS 1 calls them by capitals
     fields = {key.lower(): tuple(map(float, getattr(found, key))) for key in keys}
-    return CameraInfo(int(found.width), int(found.height), str(found.distortion_model), **fields)
+    of, roi = found, found.roi
+    if roi.width and roi.height:  # K and P are those of the whole image [sensor_msgs/CameraInfo]
+        of = roi
+        for key in "kp":
+            rows = np.reshape(fields[key], (3, -1))
+            rows[:2] -= np.outer((roi.x_offset, roi.y_offset), rows[2])
+            fields[key] = tuple(rows.ravel().tolist())
+    return CameraInfo(int(of.width), int(of.height), str(found.distortion_model), **fields)
 
 
 def image_encoding(topic: Topic, data: memoryview) -> str:

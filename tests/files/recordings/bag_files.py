@@ -52,8 +52,8 @@ def disparity_image(store, values, stamp, number=0, focal=700.0, baseline=0.5, l
     )
 
 
-def camera_info(store, stamp, size, p, d=(), k=None, r=None, number=0):
-    """A CameraInfo; ROS 1 has capital letters."""
+def camera_info(store, stamp, size, p, d=(), k=None, r=None, number=0, region=(0, 0, 0, 0)):
+    """A CameraInfo, of a region (x, y, height, width) of the image; ROS 1 has capital letters."""
     values = {
         "d": np.array(d, np.float64),
         "k": np.array(k if k is not None else np.eye(3).ravel(), np.float64),
@@ -62,7 +62,7 @@ def camera_info(store, stamp, size, p, d=(), k=None, r=None, number=0):
     }
     if store is ROS1:
         values = {key.upper(): each for key, each in values.items()}
-    roi = store.types["sensor_msgs/msg/RegionOfInterest"](0, 0, 0, 0, False)
+    roi = store.types["sensor_msgs/msg/RegionOfInterest"](*region, False)
     return store.types["sensor_msgs/msg/CameraInfo"](
         header=header(store, stamp, number),
         height=size[1],

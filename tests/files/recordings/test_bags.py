@@ -14,6 +14,7 @@ import pytest
 import rollcli as package
 from rollcli.errors import InputError, UsageError
 from rollcli.files.formats import read_image
+from rollcli.rig.calibration import Calibration
 from tests.files.recordings.bag_files import KINDS, camera_info, compressed, disparity_image, image, write_bag
 from tests.run_cli import road_map, rollcli, write_pair
 from tests.run_cli import rows_of as rows
@@ -292,14 +293,21 @@ def test_the_only_topic_of_maps_is_found_among_others_and_behind_damage(tmp_path
     assert [row["status"] for row in rows(done.out)] == ["error", "ok", "ok"]
 
 
-def test_one_camera_gives_the_calibration_of_maps_that_state_their_baseline(tmp_path):
+@pytest.mark.parametrize("cy", [360.0, 300.0])
+def test_one_camera_gives_the_calibration_of_maps_that_state_their_baseline(tmp_path, cy):
+    """It sends a region of its image, which need not hold the principal point."""
+
     def make(store):
-        yield "/stereo/left/camera_info", START, camera_info(store, START, (160, 120), P)
+        info = camera_info(
+            store, START, (640, 480), (350.0, 0, 280, 0, 0, 350, cy, *P[7:]), region=(200, 300, 120, 160)
+        )
+        yield "/stereo/left/camera_info", START, info
         yield "/stereo/disparity", START, disparity_image(store, maps(1)[0], START, baseline=-0.25)
 
     path = write_bag(tmp_path, "drive", "mcap", make)
     (frame,) = package.open_recording(path)
-    assert (frame.calibration.fx, frame.calibration.baseline, frame.calibration.doffs) == (350, 0.25, 0)
+    region = Calibration(350, 350, 80, 60, 0.25, 0.0, 160, 120, source=f"CameraInfo of {path}")
+    assert frame.calibration == (region if cy == 360 else None)
 
 
 @pytest.mark.parametrize(
