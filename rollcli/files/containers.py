@@ -82,6 +82,16 @@ def is_rest(location: str) -> bool:
     return inside is not None and inside[1] == "rest" and inside[0].lower().endswith((*BAGS, *VIDEOS))
 
 
+def has_doffs(location: str) -> bool:
+    """Tell whether a frame is a DisparityImage of a bag, which has the offset of its calibration already."""
+    inside = split_member(location)
+    if inside is None or not inside[0].lower().endswith(BAGS):
+        return False
+    from rollcli.files.recordings.frames import is_disparity_image
+
+    return is_disparity_image(*inside)
+
+
 def bag_files(location: str) -> list[str]:
     """List the files of a bag: itself, or those of a rosbag2 folder in order; none where this is no bag.
 

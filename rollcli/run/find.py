@@ -19,6 +19,7 @@ from rollcli.files.containers import (
     bag_files,
     file_of,
     frame_name,
+    has_doffs,
     is_archive,
     is_rest,
     is_video,
@@ -414,13 +415,7 @@ def _in_bags(bags: _Bags, options: FramesOptions) -> Iterator[_Named]:
         known, given = bag.calibration, options.calibration
         options.running.note(*bag.notes, *([] if given.given else bag.uncalibrated))
         known = None if known is None or given.calib else with_numbers(known, given)
-        if not (bag.has_doffs and given.calib and given.doffs is None):
-            yield from ((*views, known) for views in bag.frames)
-            continue
-        calibration_of = calibration_finder(given)
-        for views in bag.frames:
-            own = calibration_of(views[0].name)
-            yield (*views, own and replace(own, doffs=0.0))
+        yield from ((*views, known) for views in bag.frames)
 
 
 def _frame_maker(options: FramesOptions) -> Callable[..., Frame]:
@@ -431,6 +426,9 @@ def _frame_maker(options: FramesOptions) -> Callable[..., Frame]:
     def frame(left: Input, right: Input | None = None, calibration: Calibration | None = None) -> Frame:
         # what is made of an input must stay in its folder, whatever a store or an archive calls it
         foreign = is_url(left.location) or file_of(left.location) != left.location
+        known = calibration or calibration_of()(left.name)
+        if known and known.doffs and options.calibration.doffs is None and has_doffs(left.location):
+            known = replace(known, doffs=0.0)
         return Frame(
             file=left.name,
             right_file=right.name if right else "",
@@ -438,7 +436,7 @@ def _frame_maker(options: FramesOptions) -> Callable[..., Frame]:
             right_path=right.location if right else "",
             relative=left.relative if not foreign or names_a_file(left.relative) else "",
             mask=mask_of(left.name),
-            calibration=calibration or calibration_of()(left.name),
+            calibration=known,
         )
 
     return frame

@@ -36,8 +36,6 @@ class BagFrames:
         Maps, or left and right views.
     calibration : Calibration or None
         Of the rectified pair, by CameraInfo.
-    has_doffs : bool
-        Whether disparities are x_l - x_r - (cx_l - cx_r) already [stereo_msgs/DisparityImage].
     notes : list of str
         What the user should know, a line each.
     uncalibrated : list of str
@@ -46,7 +44,6 @@ class BagFrames:
 
     frames: list[tuple[Input, Input | None]] = field(default_factory=list)
     calibration: Calibration | None = None
-    has_doffs: bool = False
     notes: list[str] = field(default_factory=list)
     uncalibrated: list[str] = field(default_factory=list)
 
@@ -82,7 +79,7 @@ def maps_of_bag(files: Sequence[str], name: str, topic: str | None) -> BagFrames
     chosen = topic or _only_map_topic(files, topics, name)
     found = _scan(files, [_known(topics, chosen, name)], topics)
     has_doffs = topics[chosen].type == DISPARITY
-    bag = BagFrames([(each, None) for each in found.frames[chosen]], has_doffs=has_doffs)
+    bag = BagFrames([(each, None) for each in found.frames[chosen]])
     left, right = _cameras(found, chosen)
     stated = 0.0
     for each in found.frames[chosen] if has_doffs else ():
@@ -143,6 +140,14 @@ def pairs_of_bag(files: Sequence[str], name: str, left: str, right: str, toleran
         bag.uncalibrated.append(f"{name}: {_beside(left)} is {_NO_P}")
     _finish(bag, found, name, f"{left} and {right}")
     return bag
+
+
+def is_disparity_image(path: str, member: str) -> bool:
+    """Tell whether a frame is one; its disparities are x_l - x_r - (cx_l - cx_r) already."""
+    with contextlib.suppress(InputError):  # its row says so
+        topic = opened(path).topics.get(split_position(member)[0].rpartition("@")[0])
+        return topic is not None and topic.type == DISPARITY
+    return False
 
 
 def nearest(lefts: Sequence[int], rights: Sequence[int], tolerance: int) -> dict[int, int]:

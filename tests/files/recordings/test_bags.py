@@ -374,8 +374,9 @@ def test_pitch_and_height_of_disparity_images_take_the_left_camera_alone(tmp_pat
     whole, found = (rows(rollcli("estimate", path, cwd=tmp_path).out) for path in paths)
     sides = "cam0=[350 0 80; 0 350 60; 0 0 1]\ncam1=[350 0 89; 0 350 60; 0 0 1]"
     (tmp_path / "calib.txt").write_text(f"{sides}\ndoffs=9\nbaseline=500\nwidth=160\nheight=120\n")
-    given = rows(rollcli("estimate", paths[0], "--calib", "calib.txt", cwd=tmp_path).out)
-    for one, *others in zip(whole, found, given, strict=True):
+    both = paths[:1], [row["file"] for row in whole]
+    given = [rows(rollcli("estimate", *each, "--calib", "calib.txt", cwd=tmp_path).out) for each in both]
+    for one, *others in zip(whole, found, *given, strict=True):
         for two in others:
             assert (one["pitch_deg"], one["height_m"]) == (two["pitch_deg"], two["height_m"])
 
