@@ -44,8 +44,8 @@ def is_folder_url(url: str) -> bool:
 
 
 def is_place(location: str) -> bool:
-    """Tell whether a location holds files: a local folder, or what `is_folder_url` takes for one."""
-    return is_folder_url(location) if is_url(location) else is_folder(location)
+    """Tell whether a location holds files: a folder, an archive, or what `is_folder_url` takes for one."""
+    return is_folder_url(location) if is_url(location) else is_folder(location) or is_archive(location)
 
 
 def objects_behind(url: str, *, recursive: bool) -> Iterator[tuple[str, str]]:
@@ -191,7 +191,8 @@ class Search:
         if first is None:
             hint = self._in_place_of_inputs(argument) if kind == "folder" else ""
             hint = f"; {LEAVE_NONE}" if found else hint
-            raise UsageError(f"{argument}: no input found in this {kind} ({' '.join(self.endings)}){hint}")
+            endings = " ".join(self.endings) or "of any ending"
+            raise UsageError(f"{argument}: no input found in this {kind} ({endings}){hint}")
         yield first
         yield from wanted
 

@@ -7,12 +7,13 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from typing import overload
 
 from rollcli.errors import InputError, UsageError
 from rollcli.extras import require_extra
 from rollcli.files.atomic import is_file
+from rollcli.files.bounded import as_utf8
 from rollcli.files.containers import (
     BAGS,
     VIDEOS,
@@ -23,10 +24,11 @@ from rollcli.files.containers import (
     is_archive,
     is_rest,
     is_video,
+    shown,
 )
 from rollcli.files.inputs import Manifest, find_inputs, named_input, pair_inputs
-from rollcli.files.naming import Input, gathered, natural_key
-from rollcli.files.search import IMAGE_ENDINGS, LEAVE_NONE, MAP_ENDINGS, Search, is_place, objects_behind
+from rollcli.files.naming import Input, gathered, listed, natural_key
+from rollcli.files.search import IMAGE_ENDINGS, LEAVE_NONE, MAP_ENDINGS, Search, is_place
 from rollcli.files.storage import fetch_all, read_bytes
 from rollcli.files.stores.locations import is_url, names_a_file, public_name
 from rollcli.rig.calibration import Calibration, CalibrationOptions, require_calibration
@@ -99,14 +101,14 @@ def calibration_finder(given: CalibrationOptions) -> Callable[[str], Calibration
         one = _read(given.calib, given) if given.given else None
         return lambda name: one
     files = _files(given.calib[0])
-    by_stem = gathered((PurePosixPath(path).stem.removesuffix(_MARK), path) for path in files)
+    by_stem = gathered((_stem(shown(path)).removesuffix(_MARK), path) for path in files)
     fetched = fetch_all(filter(is_url, files), MAX_BYTES)  # one after the other takes long
     read = cache(lambda path: _read([path], given, fetched))  # one may be for a thousand frames
 
     def of(name: str) -> Calibration | None:
         if _is_broken(name):
             return None
-        stem = PurePosixPath(frame_name(name)).stem
+        stem = _stem(name)
         while stem not in by_stem and "_" in stem:  # KITTI's 000010.txt is for 000010_10.png
             stem = stem.rpartition("_")[0]
         return read(_only(by_stem, stem, "calibration", name, given.calib[0]))
@@ -122,18 +124,23 @@ def mask_finder(mask: str | None) -> Callable[[str], str | None]:
     UsageError
         There is no such file or folder.
     """
-    if mask is not None and (is_place(mask) or is_archive(mask)):
+    if mask is not None and is_place(mask):
         found = find_inputs([mask], Search(recursive=True))
-        by_stem = gathered((Path(frame_name(each.name)).stem, each.location) for each in found)
+        by_stem = gathered((_stem(each.name), each.location) for each in found)
 
         def of(name: str) -> str | None:
-            stem = PurePosixPath(frame_name(name)).stem
-            return None if _is_broken(name) else _only(by_stem, stem, "mask", name, mask)
+            return None if _is_broken(name) else _only(by_stem, _stem(name), "mask", name, mask)
 
         return of
     if mask is not None and not (is_url(mask) or is_file(file_of(mask))):
         raise UsageError(f"{mask}: no such mask file or folder")
     return lambda name: mask
+
+
+def _stem(name: str) -> str:
+    """Return a frame's name without its ending; one of a recording has none, but may have dots."""
+    inside = frame_name(name)
+    return PurePosixPath(inside).stem if name.endswith(inside) else inside
 
 
 def _is_broken(name: str) -> bool:
@@ -147,13 +154,13 @@ def _only(by_stem: Mapping[str, Sequence[str]], stem: str, what: str, name: str,
     if not paths:
         raise UsageError(f"{name}: has no {what} of its name in {folder}")
     if len(paths) > 1:
-        raise UsageError(f"{name}: has more than one {what} of its name: {paths[0]}, {paths[1]}")
+        raise UsageError(f"{name}: has more than one {what} of its name: {listed(map(shown, paths))}")
     return paths[0]
 
 
 def calibration_files(given: CalibrationOptions) -> list[str]:
     """List the files that a user named, those of a folder one by one."""
-    return [path for name in given.calib for path in (_files(name) if is_place(name) else [name])]
+    return [shown(path) for name in given.calib for path in (_files(name) if is_place(name) else [name])]
 
 
 def calibration_notes(frames: Sequence[Frame]) -> list[str]:
@@ -226,10 +233,7 @@ def check_depth(frames: Sequence[Frame], options: FramesOptions) -> None:
 
 
 def _files(folder: str) -> list[str]:
-    if is_url(folder):
-        return sorted(path for path, _ in objects_behind(folder, recursive=True))
-    found = (path for path in Path(folder).rglob("*") if is_file(path) and not path.name.startswith("."))
-    return [str(path) for path in sorted(found)]
+    return [each.location for each in find_inputs([folder], Search(("",), recursive=True))]
 
 
 def _read(
@@ -238,8 +242,9 @@ def _read(
     if len(paths) > 2:
         raise UsageError("--calib is given at most twice: for the left and the right view of ROS")
     fetched = fetched or {}
-    files = [(public_name(path), fetched.get(path) or read_bytes(path, most=MAX_BYTES)) for path in paths]
-    return parse_calibration(files, given)
+    names = [shown(public_name(path)) for path in paths]
+    data = [fetched.get(path) or read_bytes(path, most=MAX_BYTES) for path in paths]
+    return parse_calibration([*zip(names, map(as_utf8, data, names), strict=True)], given)
 
 
 # a frame's left view or map, its right view, and the calibration of its bag
@@ -375,7 +380,7 @@ _Bags = list[tuple[str, list[str]]]  # each with its files
 
 
 def _bags(given: InputOptions) -> _Bags:
-    """List the bags among the inputs; all inputs are bags, or none is.
+    """List the bags among the inputs, in natural order, each once; all inputs are bags, or none is.
 
     Raises
     ------
@@ -389,17 +394,17 @@ def _bags(given: InputOptions) -> _Bags:
     if bags:
         require_extra("bags", bags[0][0])
     search = Search(include=given.include, exclude=given.exclude)
-    allowed = [each for each in bags if search.allows(each[0].rstrip("/"))]
+    allowed = {os.path.realpath(each[0]): each for each in bags[::-1] if search.allows(each[0].rstrip("/"))}
     if bags and not allowed:
         raise UsageError(f"no input found: {LEAVE_NONE} of the named bags")
-    return allowed
+    return sorted(allowed.values(), key=lambda each: natural_key(each[0]))
 
 
 def _behind(name: str) -> list[str]:
-    """List the bags that a pattern finds, in natural order; of anything else the name itself."""
+    """List the bags that a pattern finds; of anything else the name itself."""
     pattern = name.lower().endswith(BAGS) and not os.path.lexists(name)
     found = glob.glob(name, recursive=True) if pattern else []  # noqa: PTH207 (as in a search)
-    return sorted(found, key=natural_key) or [name]
+    return sorted(found) or [name]
 
 
 def _in_bags(bags: _Bags, options: FramesOptions) -> Iterator[_Named]:

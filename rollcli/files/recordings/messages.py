@@ -14,7 +14,7 @@ from rollcli.errors import InputError
 from rollcli.extras import require_extra
 from rollcli.files.bounded import MOST_BYTES
 from rollcli.files.codecs import pictures, png
-from rollcli.files.codecs.arrays import require_decoded_fits
+from rollcli.files.codecs.arrays import native, require_decoded_fits
 from rollcli.files.recordings.bags import Topic
 
 DISPARITY = "stereo_msgs/DisparityImage"
@@ -252,8 +252,7 @@ def _pixels(image: Any) -> NDArray[Any]:
         raise InputError(f"is truncated: {needed} bytes are needed, {data.size} are there")
     require_decoded_fits(width, height, channels * dtype.itemsize, data.size)
     values: NDArray[Any] = np.ndarray((height, width * channels), dtype, data, strides=(step, dtype.itemsize))
-    values = values.astype(dtype.newbyteorder("="), copy=False)
-    values = np.ascontiguousarray(values)  # of any alignment: a message lies anywhere in its chunk
+    values = native(values)
     if channels > 1:
         values = values.reshape(height, width, channels)[..., :3]
         return np.ascontiguousarray(values[..., ::-1] if encoding.startswith("rgb") else values)
