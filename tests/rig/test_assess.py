@@ -65,6 +65,8 @@ def test_images_of_two_sizes_are_two_drives_and_so_are_two_results():
         "width": [640] * 20 + [320] * 20,
         "height": [480] * 20 + [240] * 20,
     }
+    for place in (0, 10, 30):  # a frame that could not be read has no size
+        given["status"][place], given["width"][place], given["height"][place] = "error", None, None
     assert [each.name for each in rollcli.assess_rig(given).drives] == ["run (640x480)", "run (320x240)"]
 
 

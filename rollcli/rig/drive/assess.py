@@ -338,7 +338,12 @@ def _kinds(frames: RigFrames) -> list[str]:
     origins = frames.origins or [""] * count
     if all(len(np.unique(each[np.isfinite(each)])) < 2 for each in sides):
         return list(origins)
-    sizes = (f"{wide:.0f}x{high:.0f}" if wide == wide else "" for wide, high in np.transpose(sides).tolist())
+    sizes = [f"{wide:.0f}x{high:.0f}" if wide == wide else "" for wide, high in np.transpose(sides).tolist()]
+    keys = list(zip(map(drive_of, frames.files), origins, strict=True))
+    # a frame that could not be read has no size: it is of the drive of those before it, or behind it
+    last = dict(reversed([each for each in zip(keys, sizes, strict=True) if each[1]]))
+    for place, key in enumerate(keys):
+        sizes[place] = last[key] = sizes[place] or last.get(key, "")
     return [" ".join(filter(None, each)) for each in zip(origins, sizes, strict=True)]
 
 
