@@ -113,12 +113,12 @@ def findings(rig: RigAssessment, *, roll: bool = True) -> list[str]:
     roll : bool
         Whether to say the jumps and drifts of the roll too, which the table has already.
     """
-    sentences = []
-    for place, drive in enumerate(rig.drives):
+    sentences, before = [], ""
+    for drive in rig.drives:
         name = rig.name_of(drive)
         if drive.differs:
-            before = rig.name_of(rig.drives[place - 1])
             sentences.append(f"{name} differs from {before} by {answer(drive.change, change=True)}")
+        before = name if drive.quantities[ROLL.name].used else before
         where = f" of {name}" if len(rig.drives) > 1 and drive.name else ""
         for quantity in (*QUANTITIES, *ALIGNMENT):
             found = drive.quantities.get(quantity.name)

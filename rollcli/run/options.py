@@ -652,7 +652,7 @@ class GateOptions:
     max_drift : float or None
         Largest drift of the roll over a drive, degrees.
     max_jump : float or None
-        Largest jump of the roll, degrees.
+        Largest jump of the roll within a drive or from one to the next, degrees.
     max_misalignment : float or None
         Largest vertical shift between the views of a pair anywhere in the image, pixels.
     min_ok : float or None

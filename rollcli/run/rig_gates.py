@@ -344,6 +344,9 @@ def _drift(rig: RigAssessment, drive: DriveAssessment, limit: float) -> Iterator
 
 def _jumps(rig: RigAssessment, drive: DriveAssessment, limit: float) -> Iterator[_Told]:
     found = drive.quantities[ROLL.name]
+    if drive.differs:
+        what = f"change from the drive before to {frame_name(rig, drive, 0)}"
+        yield _limited(what, drive.change, limit)
     for jump in found.jumps:
         yield _limited(f"jump at {frame_name(rig, drive, jump.frame)}", jump.change, limit)
     used = found.series.values[found.series.used]

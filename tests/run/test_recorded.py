@@ -104,6 +104,7 @@ GATES = {
     },
     "no drift known": (_rolled, {"max_drift": 90.0, "max_jump": 1.0}),
     **{f"jumps, {most}": (JUMPED, {"max_jump": most}) for most in (1.0, 1.75)},
+    "drives that differ": (_drives, {"max_jump": 2.0}),
     "too few for jumps": (partial(_rolled, short(0.0)), {"max_jump": 1.0}),
     **{f"share {least}": (_doubted, {"min_ok": least}) for least in (0.75, 0.7501, 0.0, 1.0)},
     "all": (STILL, {"expect_roll": 0.0, "within": 1.0, "max_drift": 1.0, "max_jump": 1.0, "min_ok": 1.0}),
