@@ -165,10 +165,15 @@ def _json_rows(lines: Iterable[str]) -> Iterator[tuple[int, dict[str, Any]]]:
             values = json.loads(line)
         except (ValueError, RecursionError) as error:
             raise InputError(f"line {number}: is not JSON: {error}") from error
-        missing = [name for name in REQUIRED if not isinstance(values, dict) or name not in values]
-        if missing:
-            raise InputError(f"line {number}: is no row of rollcli estimate: no {', '.join(missing)}")
-        yield number, values
+        yield number, _row_of(values, f"line {number}")
+
+
+def _row_of(values: Any, place: str) -> Any:
+    """Return the values of a row; refuse those without what every row has."""
+    missing = [name for name in REQUIRED if not isinstance(values, dict) or name not in values]
+    if missing:
+        raise InputError(f"{place}: is no row of rollcli estimate: no {', '.join(missing)}")
+    return values
 
 
 _PART = re.compile(r"part-(\d{5,})\.(csv|jsonl|parquet)")
@@ -399,8 +404,8 @@ def pieces_of(path: str) -> Iterator[tuple[str, bytes]]:
 def _cells_of(data: bytes, wanted: Sequence[str]) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
     """Return those of the wanted columns that are there; for each row where it stands, and their cells."""
     if data.startswith(MAGIC):
-        table = decode_parquet(data)
-        return list(wanted), ((f"row {number}", *map(values.get, wanted)) for number, values in table)
+        table = ((f"row {number}", values) for number, values in decode_parquet(data))
+        return list(wanted), ((place, *map(_row_of(values, place).get, wanted)) for place, values in table)
     # decoded piece by piece: as one text, a million rows would take a gigabyte more
     stream = io.BytesIO(data)
     if data[:_MOST_SPACE].lstrip().startswith(b"{"):
