@@ -100,8 +100,9 @@ def drift_in_words(
 
 
 def frame_name(rig: RigAssessment, drive: DriveAssessment, place: int) -> str:
-    """Return the name of a frame of a drive, without the folders that all have in common."""
-    return rig.names[int(drive.frames[place])]
+    """Name a frame of a drive, without the folders common to all, and with its result where several are."""
+    frame = int(drive.frames[place])
+    return rig.names[frame] + (f" ({rig.frames.origins[frame]})" if rig.frames.origins else "")
 
 
 def findings(rig: RigAssessment, *, roll: bool = True) -> list[str]:
