@@ -93,8 +93,14 @@ def draw_preview(disparity: NDArray[Any]) -> Pixels:
 
 
 def as_bgr(photo: NDArray[Any], size: tuple[int, int]) -> Pixels:
-    """Return a new BGR image, uint8, of a camera image, grey or BGR, uint8 or uint16, at (width, height)."""
-    pixels = photo if photo.dtype == np.uint8 else (photo >> 8).astype(np.uint8)
+    """Return a new BGR image, uint8, of a camera image, grey or BGR, uint8 or uint16, at (width, height).
+
+    Cameras leave some of 16 bits unused: what is bright in the image is white.
+    """
+    pixels = photo
+    if photo.dtype != np.uint8:
+        white = max(float(np.percentile(photo[::_EVERY, ::_EVERY], _BRIGHT)), 1.0)
+        pixels = cv2.convertScaleAbs(photo, alpha=255 / white)
     if pixels.shape[1::-1] != size:
         pixels = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
     picture = cv2.cvtColor(pixels, cv2.COLOR_GRAY2BGR) if pixels.ndim == 2 else pixels.copy()
@@ -162,6 +168,7 @@ _BELOW_TO_ABOVE = (
 _NO_DATA = (60, 60, 60)
 _DARKEST = 0.35  # of a colour, where the photo under it is black
 _BRIGHT = 98  # per cent of a photo's pixels are darker than what counts as white
+_EVERY = 4  # rows and columns of a photo of 16 bits, of which one tells that
 _LABELS = 8  # at most, but for the ends
 
 

@@ -277,7 +277,7 @@ CASES = {
         for height, top in ((40, 60.0), (50, 33.0), (51, 60.0), (120, 0.7), (260, 150.0))
     },
     "road": lambda: _picture(draw_road, _map((60, 80)), _disc()),
-    "road on a photo": lambda: _picture(draw_road, _map((60, 80)), _disc(hole=False), _photo()),
+    "road on a photo": lambda: _picture(draw_road, _map((60, 80)), _disc(hole=False), _photo() >> 4),
     "road on a small photo": lambda: _picture(
         draw_road, _map((60, 80)), _disc(), _photo((60, 80, 3), np.uint8)
     ),
