@@ -95,6 +95,7 @@ _OPEN_COLUMNS = 0.001
 # 2 px, as calibrated rigs have, leave a third of it
 _OPEN_PITCH = 0.0003
 MUCH_AT_END = 0.05  # share of a map; with more at the end of the searched range, that was too short
+_WIDEST = 2**14 - 1  # px: they are made twice as large, and OpenCV reads between pixels of up to 32766
 _FURTHEST = 12.0, 0.03, 0.02  # offset, rotation and scale that no rig in use has: px, radians, share
 # the doubts of a pair: its correction was still changing when it was given up, or could not be checked; its
 # columns may be far from where they are believed to be; it is not level once it was levelled as a file says
@@ -261,6 +262,8 @@ def match_pair(
     (height, width), first = views[0].shape[:2], options.min_disparity
     if usable_range(1, first, width, options.block_size) < NARROWEST:
         raise InputError(f"images {width} px wide are too narrow to match from disparity {first} on")
+    if width > _WIDEST:
+        raise InputError(f"images {width} px wide cannot be matched, {_WIDEST} can: give --downscale 2")
     told = options.given_alignment(width, height)
     small, again = SmallViews(views, given), look is not None
     if options.measures_alignment:

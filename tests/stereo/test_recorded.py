@@ -176,9 +176,9 @@ CASES = {
     "seen from the right": lambda: seen_from_right(_NEAR),
     "options": lambda: {name: [_taken(name, each) for each in given] for name, given in OPTIONS.items()},
     "no views": lambda: [made(prepare_views, *each) for each in NO_VIEWS],
-    "narrow views": lambda: [
+    "narrow and wide views": lambda: [
         made(compute_disparity, *(np.zeros(shape, np.uint8),) * 2)
-        for shape in ((1, 1), (2, 3), (5, 20), (300, 10))
+        for shape in ((1, 1), (2, 3), (5, 20), (300, 10), (60, 16384))
     ],
     # each part alone, of either sign, and all of them
     "advice": lambda: [
