@@ -1,7 +1,7 @@
 """From a disparity map to a roll angle: which pixels, a solver, how sure, what speaks against it."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -186,7 +186,7 @@ def estimate_roll(
     ('ok', 3.0)
     """
     tuning = request.tuning
-    checked = CheckedMap.of(disparity, mask)
+    checked = CheckedMap.of(disparity, mask, request.doffs)
     pixels = select_pixels(checked, request)
     certified = _solve(pixels, request)
     theta, surface = certified.solution.theta, pixels.surface
@@ -210,13 +210,13 @@ def estimate_roll(
         converged=certified.solution.status.converged,
         global_minimum=None if request.method in AREAS else certified.is_global,
         rmse=pixels.energy.rmse(certified.energy),
-        alpha=alpha,
+        alpha=(alpha[0] - request.doffs, *alpha[1:]),
         valid_fraction=checked.count / checked.values.size,
         road_fraction=pixels.share,
         width=width,
         height=height,
         camber=None if knife is None else knife.camber,
-        tangent=tangent,
+        tangent=replace(tangent, disparity=tangent.disparity - request.doffs),
         road_mask=pixels.mask(checked, tuning) if road_mask else None,
     )
 

@@ -45,7 +45,7 @@ class CheckedMap:
     count: int
 
     @classmethod
-    def of(cls, disparity: ArrayLike, mask: ArrayLike | None) -> "CheckedMap":
+    def of(cls, disparity: ArrayLike, mask: ArrayLike | None, doffs: float = 0.0) -> "CheckedMap":
         """Check a map and its mask.
 
         Parameters
@@ -54,6 +54,8 @@ class CheckedMap:
             Real numbers, px; <= 0, NaN and what is beyond `LARGEST` are no data.
         mask : array_like, shape (H, W), optional
             Neither 0 nor NaN where a pixel may be used.
+        doffs : float
+            See `Request`: the values have it.
 
         Raises
         ------
@@ -76,7 +78,12 @@ class CheckedMap:
         valid: Bools = values > 0
         if usable is not None:
             valid &= usable
-        return cls(values, usable, valid, require_pixels(valid))
+        count = require_pixels(valid)
+        if doffs != 0:
+            values = from_infinity(values, doffs)
+            valid &= values > 0
+            count = require_pixels(valid, f" before the camera with a doffs of {doffs:g} px")
+        return cls(values, usable, valid, count)
 
 
 def map_of(disparity: ArrayLike | None) -> NDArray[Any]:
@@ -121,6 +128,13 @@ def _with_hidden_as_0(values: ArrayLike) -> NDArray[Any]:
 def has_disparity(values: NDArray[Any]) -> Bools:
     """Tell which numbers of a map are disparities: above 0, and not beyond `LARGEST`."""
     return np.asarray((values > 0) & (values < LARGEST))
+
+
+def from_infinity(values: NDArray[Any], doffs: float) -> NDArray[Any]:
+    """Add `doffs` to the disparities of a map, so that they are 0 infinitely far away; 0 is no data, too."""
+    real = np.result_type(values, np.float32)
+    shifted = values.astype(real) + real.type(doffs)
+    return np.asarray(np.where(has_disparity(values), shifted, real.type(0)))
 
 
 def strips(height: int, rows: int) -> list[slice]:

@@ -78,6 +78,8 @@ class Request:
     middle : float or None
         Column that looks straight ahead, px: the principal point's, which a crop moves away from the
         middle of the map. None: that middle.
+    doffs : float
+        What is added to disparities so that they are 0 infinitely far away, px: that of a calibration.
     tuning : Tuning
         The estimator's tuned numbers; to study what they do.
 
@@ -97,6 +99,7 @@ class Request:
     slope_error: float = 0.0
     seed: int = 0
     middle: float | None = None
+    doffs: float = 0.0
     tuning: Tuning = TUNING
 
     def __post_init__(self) -> None:

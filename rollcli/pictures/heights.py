@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
 from rollcli.estimator.estimate import RollEstimate
-from rollcli.estimator.moments import Floats, Singles, has_disparity, map_of, strips
+from rollcli.estimator.moments import Floats, Singles, from_infinity, has_disparity, map_of, strips
 from rollcli.estimator.road.model import FARTHEST_SIDE, Coordinate, RoadModel
 from rollcli.estimator.road.sample import medians_of
 from rollcli.files.results import Row
@@ -183,6 +183,10 @@ def heights_over(disparity: NDArray[Any], road: FittedRoad, calibration: Calibra
     if calibration is not None:
         calibration = calibration.for_size(road.width, road.height)
     heights = np.full(disparity.shape, np.nan, np.float32)
+    if calibration is not None and calibration.doffs != 0:
+        a0, a1, a2 = road.model.alpha
+        model = road.model._replace(alpha=(a0 + calibration.doffs, a1, a2))
+        disparity, road = from_infinity(disparity, calibration.doffs), replace(road, model=model)
     profile = _Profile.of(road)
     if profile is None:
         return heights
@@ -310,10 +314,9 @@ class _Profile:
         """
         road = self.road
         cosine, sine, camber = math.cos(road.model.theta), math.sin(road.model.theta), road.model.camber
-        doffs = 0.0 if calibration is None else calibration.doffs
         with np.errstate(over="ignore"):  # what becomes inf is no data
             d = stored.astype(np.float32)
-        known = has_disparity(d) & (d > np.float32(-doffs))
+        known = has_disparity(d)
         d[~known] = self.disparity
         rest: Singles | np.float32 = np.float32(1)
         root: Singles | np.float32 = np.float32(1)
@@ -326,9 +329,9 @@ class _Profile:
         if calibration is None:
             return np.where(known, gap * np.float32(self.rise) / d, np.float32(np.nan))
         # |q| of the planes that touch the road, by their rise, 1/m
-        aspect, shifted = calibration.fy / calibration.fx, d + np.float32(doffs)
+        aspect = calibration.fy / calibration.fx
         along = calibration.cy * cosine - calibration.cx * sine - self.row
-        ahead = shifted * rest / rise - foot + np.float32(along)
+        ahead = d * rest / rise - foot + np.float32(along)
         lean: Singles | np.float32 = np.float32(sine**2 + (aspect * cosine) ** 2)
         if camber:
             tilt = side / rise * np.float32(camber * road.middle_rise)
@@ -337,7 +340,7 @@ class _Profile:
             lean = (tilt * np.float32(cosine**2 + (aspect * sine) ** 2) + skew) * tilt + lean
         ahead *= np.float32(1 / calibration.fx)
         length = np.sqrt(ahead * ahead + lean) * np.float32(1 / (calibration.baseline or 1.0))
-        return np.where(known, gap / (length * shifted), np.float32(np.nan))
+        return np.where(known, gap / (length * d), np.float32(np.nan))
 
 
 def _profile_basis(x: NDArray[Any]) -> NDArray[Any]:

@@ -117,7 +117,8 @@ def estimate_roll(
         remedy = REMEDIES["photograph"][True]
         raise UsageError(f"an array of shape {values.shape} is no disparity map: {remedy}")
     if rig is not None and values.ndim == 2:
-        request = replace(request, middle=rig.for_size(*values.shape[::-1]).cx)
+        own = rig.for_size(*values.shape[::-1])
+        request = replace(request, middle=own.cx, doffs=own.doffs)
     like = partial(_likeness, values, seed)
     estimate, likeness = estimate_or_liken(values, request, like, mask=mask, road_mask=road_mask)
     beyond = ""
@@ -204,7 +205,9 @@ def estimate_pair(
         raise UsageError("the mask leaves no pixel of the map: give an array that is not all zero")
     source = matched_source(left, right, stereo or StereoOptions(), road_finder(allowed, request))
     rig = source.calibrated(rig)
-    request = replace(request, slope_error=source.slope_error, middle=None if rig is None else rig.cx)
+    request = replace(request, slope_error=source.slope_error)
+    if rig is not None:
+        request = replace(request, middle=rig.cx, doffs=rig.doffs)
     with source.doubting():
         estimate = estimator.estimate_roll(source.disparity, request, mask=allowed, road_mask=road_mask)
     estimate = source.doubted(estimate)

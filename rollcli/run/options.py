@@ -238,8 +238,9 @@ class MethodOptions(NamedTuple):
             name.removesuffix("_deg"): math.radians(value) if name.endswith("_deg") else value
             for name, value in self._asdict().items()
         }
-        middle = None if calibration is None else calibration.cx
-        return Request(**given, slope_error=slope_error, middle=middle)
+        if calibration is not None:
+            given |= {"middle": calibration.cx, "doffs": calibration.doffs}
+        return Request(**given, slope_error=slope_error)
 
 
 class ImageOptions(NamedTuple):

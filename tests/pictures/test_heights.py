@@ -1,6 +1,7 @@
 """Heights over the road against a search for the nearest point in space, and their colours."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -29,10 +30,11 @@ class Space:
     """Points of pixels in space, metres."""
 
     def __init__(self, model, rig):
-        self.model, self.rig = model, rig
+        a0, a1, a2 = model.alpha  # camber is of the disparity that is 0 infinitely far away
+        self.model, self.rig = model._replace(alpha=(a0 + rig.doffs, a1, a2)), rig
 
     def road(self, u, v):
-        return self.model.disparity(u - CENTRE[0], v - CENTRE[1])
+        return self.model.disparity(u - CENTRE[0], v - CENTRE[1]) - self.rig.doffs
 
     def points(self, u, v, d):
         rig = self.rig
@@ -130,6 +132,11 @@ def test_a_hill_that_no_parabola_fits_is_level_and_a_dip_in_it_as_deep_as_it_is(
     for near, far in ((5, 8), (8, 12), (12, 18)):  # the parabola alone leaves 0.5, 2 and 45 mm
         lane = (depth > near) & (depth < far) & (np.abs(across) < 1.5)
         assert abs(np.median(flat[lane])) < 0.001
+    # disparities that do not begin at 0 are the same road
+    beyond, more = replace(rig, doffs=-20.0), np.where(seen > 0, seen + 20, 0)
+    again = rollcli.estimate_roll(more, calibration=beyond)
+    assert (again.roll_deg, again.ci95) == pytest.approx((estimate.roll_deg, estimate.ci95), abs=1e-5)
+    assert np.allclose(rollcli.height_map(more, again, beyond), flat, atol=1e-4, equal_nan=True)
     # numbers of any size, as of a map in other units, have the same heights, at the same cost
     same = [rollcli.height_map(seen * by, rollcli.estimate_roll(seen * by)) for by in (1, 1e-6, 1e7)]
     assert all(np.allclose(each, same[0], atol=1e-4, equal_nan=True) for each in same)
