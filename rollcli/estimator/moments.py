@@ -132,9 +132,8 @@ def has_disparity(values: NDArray[Any]) -> Bools:
 
 def from_infinity(values: NDArray[Any], doffs: float) -> NDArray[Any]:
     """Add `doffs` to the disparities of a map, so that they are 0 infinitely far away; 0 is no data, too."""
-    real = np.result_type(values, np.float32)
-    shifted = values.astype(real) + real.type(doffs)
-    return np.asarray(np.where(has_disparity(values), shifted, real.type(0)))
+    shifted = np.add(values, doffs, dtype=np.result_type(values, np.float32))
+    return np.asarray(np.where(has_disparity(values), shifted, 0))
 
 
 def strips(height: int, rows: int) -> list[slice]:

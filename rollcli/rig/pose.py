@@ -86,8 +86,7 @@ def with_pose(estimate: RollEstimate, calibration: Calibration) -> RollEstimate:
     Returns
     -------
     RollEstimate
-        Without pitch and height where the road's disparity does not grow downward, or where `doffs` puts the
-        road behind the camera.
+        Without pitch and height where the road's disparity does not grow downward.
 
     Raises
     ------
@@ -96,12 +95,8 @@ def with_pose(estimate: RollEstimate, calibration: Calibration) -> RollEstimate:
     """
     calibration = calibration.for_size(estimate.width, estimate.height)
     tangent = estimate.tangent
-    why = ""
     if tangent.slope <= 0:
         why = "no pose: the disparity does not grow down"
-    elif tangent.disparity + calibration.doffs <= 0:
-        why = f"no pose: with doffs of {calibration.doffs:g} px the road lies behind the camera"
-    if why:
         return replace(estimate, message="; ".join(filter(None, [estimate.message, why])))
     pose = pose_of(tangent, calibration)
     pitch_ci95, height_ci95 = _half_widths(tangent, calibration, pose)

@@ -205,9 +205,8 @@ def estimate_pair(
         raise UsageError("the mask leaves no pixel of the map: give an array that is not all zero")
     source = matched_source(left, right, stereo or StereoOptions(), road_finder(allowed, request))
     rig = source.calibrated(rig)
-    request = replace(request, slope_error=source.slope_error)
-    if rig is not None:
-        request = replace(request, middle=rig.cx, doffs=rig.doffs)
+    seen: dict[str, Any] = {} if rig is None else {"middle": rig.cx, "doffs": rig.doffs}
+    request = replace(request, slope_error=source.slope_error, **seen)
     with source.doubting():
         estimate = estimator.estimate_roll(source.disparity, request, mask=allowed, road_mask=road_mask)
     estimate = source.doubted(estimate)

@@ -213,8 +213,8 @@ POSED = {
 
 
 def _posed(name, calibration):
-    estimate = estimate_roll(POSED[name](), Request(road="all" if name == "ceiling" else "auto"))
-    found = made(with_pose, estimate, calibration)
+    request = Request(road="all" if name == "ceiling" else "auto", doffs=calibration.doffs)
+    found = made(lambda: with_pose(estimate_roll(POSED[name](), request), calibration))
     if isinstance(found, str):
         return found
     numbers = found.to_dict()
