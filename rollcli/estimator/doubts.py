@@ -69,6 +69,8 @@ def doubts_of(
         yield f"the road's pixels moved the roll by {math.degrees(surface.moved):.1f} degrees"
     if road and surface and abs(surface.model.theta) > _AT_BOUND * request.max_roll:
         yield "the roll is at its bound, --max-roll"
+    if interval is None:
+        yield "too few pixels lie away from the map's border to tell how sure the angle is"
     if interval and interval.noise > tuning.noise_share * request.max_interval:
         yield f"noise and misfit leave the angle open: ±{math.degrees(interval.noise):.2f} degrees"
     if interval and interval.half_width > request.max_interval:

@@ -90,6 +90,7 @@ MAPS = {
         lambda: with_noise(np.where(np.abs(U - 320) < 40, road(4), 0), 0.8),
         {},
     ),
+    "too few pixels lie away from the map's border": (lambda: noise_alone()[:3], {"road": "all"}),
     "the interval is wide": (two_halves, {"max_interval": math.radians(0.02)}),
 }
 

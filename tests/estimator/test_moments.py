@@ -96,10 +96,10 @@ def test_degenerate_pixels_are_refused_with_the_reason_by_every_method(kind, met
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("value", [7.0, 7.3, 0.1, 0.001, 300.0])
+@pytest.mark.parametrize("value", [*np.float32([7.0, 7.3, 0.1, 0.001, 300.0]), True])
 def test_a_constant_map_is_refused_by_every_method(value, method):
     with pytest.raises(EstimationError, match="same everywhere"):
-        estimate_roll(np.full((90, 120), value, np.float32), Request(method=method, road="all"))
+        estimate_roll(np.full((90, 120), value), Request(method=method, road="all"))
 
 
 def test_three_rows_and_columns_are_enough():

@@ -203,7 +203,7 @@ def iterative(disparity: NDArray[Any], usable: Bools, request: Request, chosen: 
     planes = _planes(grams)
     roads = _look_like_road(planes, request.max_roll)
     if not roads.any():
-        if np.ptp(disparity[usable]) == 0:
+        if (found := disparity[usable]).min() == found.max():
             raise EstimationError(SAME_EVERYWHERE)
         raise EstimationError("no area looks like a road: disparity grows downward in none")
     agreeing, rounds, status = _agreeing(grams, planes, roads, request.max_roll)
