@@ -230,8 +230,12 @@ def _png(image: NDArray[np.uint8]) -> bytes:
 
 
 def _earlier_files(folder: Path) -> list[Path]:
-    """List what a simulation writes: of frame_0001 and so on, where left, right and disparity all have it."""
-    stems = set.intersection(*({path.stem for path in (folder / part).glob("*.png")} for part in _VIEWS))
+    """List what a simulation writes: of frame_0001 and so on, where left, right and disparity all have it.
+
+    One that has left its record may have ended amid a frame: there any of the three tells of it.
+    """
+    join = set.union if is_there(run_path(folder / TRUTH)) else set.intersection
+    stems = join(*({path.stem for path in (folder / part).glob("*.png")} for part in _VIEWS))
     frames = [_path(folder, part, stem) for stem in filter(_OURS.fullmatch, stems) for part in _ENDINGS]
     return [folder / TRUTH, folder / f"{_CALIBRATION}.txt", *frames]
 
