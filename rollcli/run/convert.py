@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from functools import partial
+from itertools import chain
 
 from rollcli.errors import ExitStatus, RollcliError, UsageError
 from rollcli.extras import require_extra
@@ -15,7 +16,7 @@ from rollcli.files.naming import listed
 from rollcli.files.results import Row, read_result, run_path
 from rollcli.run import outputs
 from rollcli.run.batch import work_on, workers_for
-from rollcli.run.find import check_depth, check_first_size, find_frames, mask_finder
+from rollcli.run.find import calibration_files, check_depth, check_first_size, find_frames, mask_finder
 from rollcli.run.frame import Frame, located_beside
 from rollcli.run.options import (
     ConvertOptions,
@@ -44,7 +45,10 @@ def run_conversion(options: ConvertOptions) -> ExitStatus:
     running = options.running
     frames = _plan(options)
     paths_of = partial(outputs.every_path, writes=options.writes)
-    if outputs.listed_only(lambda: ((each.reads(), paths_of(each)) for each in frames), running):
+    given = [*filter(None, [options.result]), *calibration_files(options.calibration)]
+    if outputs.listed_only(
+        lambda: chain([(given, ())], ((each.reads(), paths_of(each)) for each in frames)), running
+    ):
         return ExitStatus.DONE
     require_scheduler(running.scheduler)
     progress = Progress(len(frames), options, statuses=("ok",))
