@@ -30,7 +30,7 @@ Beginning = Callable[[bytes, int, str], None] | None
 _HEAD = 2**16  # bytes: the header of an array
 _READ_ONLY = "web servers are read from, not written to"
 STREAM = "-"  # how the command line names standard input and output
-_STDOUT_NAME = "standard output"
+_STDOUT, _STDOUT_NAME = (STREAM, "/dev/stdout"), "standard output"  # which is a file behind `>`
 
 
 class Note(NamedTuple):
@@ -318,7 +318,7 @@ def _is_object(location: str) -> bool:
 def is_stream(name: str) -> bool:
     """Tell whether a name is standard output, a device or a pipe, which no file can replace."""
     mode = atomic.mode_of(name)
-    return name == STREAM or not (mode == 0 or stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+    return name in _STDOUT or not (mode == 0 or stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
 def write_output(name: str, data: bytes, *, overwrite: bool) -> None:
@@ -364,7 +364,7 @@ def open_stream(name: str) -> Iterator[Callable[[bytes], None]]:
     BrokenPipeError
         The reader has closed its end.
     """
-    if name == STREAM:
+    if name in _STDOUT:
         if sys.stdout is None:  # Python's word for a closed one; its number may be another file's by now
             raise OutputError(f"{_STDOUT_NAME}: is closed")
         yield partial(write_stream, 1, name=_STDOUT_NAME)

@@ -74,6 +74,13 @@ def test_an_answer_that_meets_a_full_disk_is_told_in_words(maps, arguments):
     assert (done.returncode, done.stderr) == (1, said)
 
 
+def test_dev_stdout_is_standard_output_where_that_is_a_file_too(maps):
+    with (maps / "rolls.csv").open("ab", buffering=0) as file:
+        file.write(b"kept\n")
+        ended(command("estimate", "maps", "-q", "-o", "/dev/stdout"), maps, stdout=file, timeout=60)
+    assert (maps / "rolls.csv").read_bytes().count(b"\n") == FRAMES + 2
+
+
 def test_an_error_keeps_its_status_when_nobody_reads_its_message(maps):
     assert without_reader(maps, ["estimate", "nothing"], "stderr").returncode == 2
 
