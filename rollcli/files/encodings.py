@@ -108,7 +108,7 @@ def to_disparity(
         for value in (*invalid, *stored.nodata, *_saturated(stored.values)):
             if math.isfinite(value):  # the others are no data already
                 disparity[stored.values == value] = 0
-    plateau = _without_plateaus(disparity)
+    plateau = _without_plateaus(disparity, "1/m" if used is Encoding.DEPTH and calibration is None else "px")
     doubt = _doubt(stored.values, used) if encoding == "auto" and scale is None else ""
     warnings = {"pages": stored.note, "encoding": doubt, "plateau": plateau}
     told = {code: warning for code, warning in warnings.items() if warning}
@@ -273,13 +273,14 @@ class PlateauTuning:
 _PLATEAU = PlateauTuning()
 
 
-def _without_plateaus(disparity: NDArray[Any]) -> str:
+def _without_plateaus(disparity: NDArray[Any], unit: str) -> str:
     """Set constant plateaus at the ends of the range to 0, which is no data, in place; say what was set.
 
     Parameters
     ----------
     disparity : ndarray, shape (H, W)
-        Pixels; 0 is no data.
+        In the unit; 0 is no data.
+    unit : str
 
     Returns
     -------
@@ -295,10 +296,8 @@ def _without_plateaus(disparity: NDArray[Any]) -> str:
         if found := _plateau(few, end):
             for value in found:
                 disparity[disparity == value] = 0
-            share = np.isin(few, found).mean()
-            said.append(
-                f"{share:.0%} of the disparities are the {which}, {found[0]:g} px: they are taken as no data"
-            )
+            share, value = np.isin(few, found).mean(), f"{found[0]:g} {unit}"
+            said.append(f"{share:.0%} of the disparities are the {which}, {value}: they are taken as no data")
     return "; ".join(said)
 
 

@@ -18,10 +18,7 @@ FRAMES = 8
 WORK = {
     "estimate": (["estimate", "maps", "-v", "-o", "rolls.csv", "--derotated", "out"], "out/*.png"),
     "derotate": (["derotate", "maps", "-v", "--roll", "1", "-o", "out"], "out/*.png"),
-    "simulate": (
-        ["simulate", "out", "-v", "--frames", str(FRAMES), "--size", "64x48", "-j1"],
-        "out/disparity/*.png",
-    ),
+    "simulate": (["simulate", "out", "-v", "--frames", "8", "--size", "64x48", "-j1"], "out/disparity/*.png"),
 }
 
 

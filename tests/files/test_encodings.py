@@ -35,14 +35,14 @@ def test_the_mark_of_opencv_is_no_data_whatever_its_range_begins_with(tmp_path, 
     known = values > 16 * first  # where it begins, the best match may lie beyond
     assert (np.unique(values[~known]) == [16 * (first - 1), 16 * first]).all()
     assert (~known).mean() > 0.2
-    values = {"int16": values, "float32": values / np.float32(16), "uint16": values.astype(np.uint16) * 16}[
-        form
-    ]
+    forms = {"int16": values, "float32": values / np.float32(16), "uint16": values.astype(np.uint16) * 16}
+    values = forms[form]
 
     found = to_disparity(Stored(values, "npy"))
 
     assert not found.disparity[~known].any()
     assert f"the smallest, {first - 1} px: they are taken as no data" in found.warnings["plateau"]
+    assert " 1/m: they are" in to_disparity(Stored(values, "npy"), encoding="depth").warnings["plateau"]
     np.save(tmp_path / "map.npy", values)
     done = rollcli("estimate", "map.npy", cwd=tmp_path, status=0)
     assert float(rows_of(done.out)[0]["roll_deg"]) == pytest.approx(truth, abs=0.2)
