@@ -27,6 +27,7 @@ from rollcli.files.results import csv_table, read_run, run_path
 from rollcli.files.stores.locations import require_local
 from rollcli.messages import say
 from rollcli.run.options import RunningOptions
+from rollcli.run.outputs import Existing
 from rollcli.run.progress import TaskProgress
 from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
@@ -277,7 +278,8 @@ def plan_dataset(folder: str | Path, options: SimulateOptions, *, overwrite: boo
             "--overwrite begins anew"
         )
     _check_resumable(dataset)
-    whole = (task.stem for task in dataset.tasks if all(map(is_there, task.files)))
+    there = Existing(filled=True)  # a power cut leaves empty ones
+    whole = (task.stem for task in dataset.tasks if all(str(path) in there for path in task.files))
     return replace(dataset, kept=frozenset(whole))
 
 
