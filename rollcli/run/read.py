@@ -317,6 +317,9 @@ def decoded(frame: Frame, options: FrameOptions) -> Frame:
     return frame
 
 
+_MOST_SEARCHED = 0.75  # of the width: hardly a road is matched in what is left
+
+
 def matched_source(
     left: NDArray[Any], right: NDArray[Any], options: StereoOptions, find_road: "FindRoad | None"
 ) -> Source:
@@ -328,6 +331,9 @@ def matched_source(
     height, width = left.shape[:2]
     at_end = f"{match.end_fraction:.0%} of the map lies at the end of the searched range"
     short = f"{at_end}; use a larger --num-disparities" if match.end_fraction > MUCH_AT_END else ""
+    if searched[1] > _MOST_SEARCHED * (columns := match.disparity.shape[1]):
+        lost = f"the left {searched[1] + 1} of {columns} columns are not matched in so wide a searched range"
+        short = f"{lost}; use a smaller --num-disparities"
     alignment = {}
     if match.lies is not None:  # rounded: a resumed run reads them from its rows
         lies = zip(ALIGNMENT_COLUMNS, match.lies.values(*match.disparity.shape), strict=True)
