@@ -241,8 +241,11 @@ def test_too_few_open_files_for_workers_end_the_run_in_one_line(maps):
     assert "Too many open files" in cannot_start(maps, jobs="12", preexec_fn=limit)
 
 
-def test_a_worker_that_cannot_load_its_libraries_ends_the_run_in_one_line(maps):
-    assert "cv2" in cannot_start(maps, env=hooked(maps, "import sys\nsys.modules['cv2'] = None\n"))
+@pytest.mark.parametrize("error", [ImportError("no NumPy"), OSError("no library"), MemoryError("no memory")])
+def test_a_worker_that_cannot_load_its_libraries_ends_the_run_in_one_line(maps, error):
+    finder = f"class Finder:\n def find_spec(name, *_):\n  if name == 'cv2': raise {error!r}\n"
+    hook = f"import sys\n{finder}sys.meta_path.insert(0, Finder)\n"
+    assert f": {error};" in cannot_start(maps, env=hooked(maps, hook))
 
 
 def test_workers_end_with_a_run_that_is_killed_also_in_the_middle_of_a_frame(maps):

@@ -164,14 +164,6 @@ def test_a_system_that_starts_no_process_is_said_with_a_remedy(monkeypatch):
         PoolExecutor(2, WORK, Workers())
 
 
-@pytest.mark.parametrize("error", [ImportError("no NumPy"), OSError("no library"), MemoryError("no memory")])
-def test_a_worker_that_cannot_be_set_up_answers_with_the_reason(error):
-    found = pools._error_of(Mock(side_effect=error))
-    assert isinstance(found, WorkerError)
-    assert str(found) == f"a worker process cannot start: {error}; try fewer of them, with --jobs"
-    assert pools._error_of(lambda: None) is None
-
-
 def test_no_scheduler_is_asked_for_unless_one_is_named():
     require_scheduler(None)
     with pytest.raises(UsageError, match=r"^--scheduler"):
