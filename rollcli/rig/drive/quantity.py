@@ -215,8 +215,8 @@ class _Fitted:
         """Return the stretches with their values."""
         found = []
         for place, (first, end) in enumerate(bounds_of(self._starts, self._cells.frames)):
-            frames = ((first + end - 1) / 2, first, end - 1)
-            values = (self.estimate(self.level(place, each)) for each in frames)
+            frames = ((first + end - 1) / 2, first, end - 1) if self._drift else (first,)  # else alike
+            values = [self.estimate(self.level(place, each)) for each in frames] * (3 // len(frames))
             found.append(Segment(first, end - 1, int(self._series.used[first:end].sum()), *values))
         return found
 
