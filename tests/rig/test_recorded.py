@@ -104,6 +104,7 @@ FOLDERS = {  # of frames, and how many are in each
     "few on average": {"a": 7, "b": 8},
     "uneven": {"a": 1, "b": 15},
     "deep": {"data/run1/x": 9, "data/run2": 9, "data/run1": 3, "other/run3": 4, ".": 2},
+    "of a root": {"/data/run1/x": 9, "/data/run1/y": 9, "s3://data/run1": 9},
     "none": {},
 }
 
@@ -298,7 +299,7 @@ CASES = {
     "no rows": lambda: [made(assess_rig, rows) for rows in NO_ROWS],
     **{
         f"drives: {groups}": partial(_split, groups)
-        for groups in ("auto", "none", "data/run*", "data/run*/", "a")
+        for groups in ("auto", "none", "data/run*", "data/run*/", "a", "/data/run*", "s3://data/*")
     },
     "answers": lambda: [
         answer(Estimate(value, half), quantity, change=change)

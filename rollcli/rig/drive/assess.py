@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
-from pathlib import PurePosixPath
 from statistics import NormalDist
 from typing import Any
 
@@ -39,9 +38,9 @@ def drive_of(file: str) -> str:
     found = _FRAME.match(file) if "#" in file else None
     if found is None:
         return file.rpartition("/")[0]
-    path = PurePosixPath(found[1])
-    split = re.fullmatch(r"(.+)_[0-9]+", path.stem)
-    return str(path.parent) if split is not None and split[1] == path.parent.name else found[1]
+    folder, _, name = found[1].rpartition("/")
+    split = re.fullmatch(r"(.+)_[0-9]+\.\w+", name)
+    return folder if split is not None and split[1] == folder.rpartition("/")[2] else found[1]
 
 
 def seconds_of(files: Sequence[str]) -> NDArray[np.float64]:
@@ -117,8 +116,9 @@ def _differ(groups: Sequence[NDArray[np.float64]]) -> bool:
 
 def _head(folder: str, pattern: str) -> str:
     """Return the first folders of a path, as many as the pattern has, where they match; else nothing."""
-    head = "/".join(PurePosixPath(folder).parts[: len(PurePosixPath(pattern).parts)])
-    return head if fnmatchcase(head, pattern.rstrip("/")) else ""
+    pattern = pattern.rstrip("/")
+    head = "/".join(folder.split("/")[: pattern.count("/") + 1])
+    return head if fnmatchcase(head, pattern) else ""
 
 
 _TO_SD = 1 / 1.959963984540054
