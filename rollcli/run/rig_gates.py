@@ -302,7 +302,7 @@ def _expected(
     """Tell of the last segment, and where it drifts of each of its ends."""
     found = drive.quantities.get(quantity.name)
     if found is None or not found.used:
-        yield None, f"the {quantity.name} of {_frames(rig, drive)} is unknown: no frame counts"
+        yield None, f"the {quantity.name} of {_frames(rig, drive)} is unknown: no frame that counts has one"
         return
     for frames, (value,) in _ends(rig, drive, [found]):
         of = "at" if found.drifts else "of"
