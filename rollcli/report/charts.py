@@ -17,7 +17,7 @@ from rollcli.report.page import Chart, scatter
 from rollcli.report.summary import degrees, with_interval
 from rollcli.rig.drive.assess import RigAssessment, seconds_of
 from rollcli.rig.quantities import ALIGNMENT, QUANTITIES, ROLL, Quantity
-from rollcli.rig.words import answer
+from rollcli.rig.words import answer, frame_name
 from rollcli.stereo.misalignment import Misalignment
 
 Trace = dict[str, Any]
@@ -121,8 +121,8 @@ def rig_traces(
                 _add_band(band, [first, last], level, [segment.begin.ci95, segment.end.ci95])
         for jump in found.jumps if found is not None else ():
             frame = int(drive.frames[jump.frame])
-            said = f"jump by {answer(jump.change, quantity, change=True)} at {rig.names[frame]}"
-            _add(jumps, [sum(axis.places[frame - 1 : frame + 1]) / 2] * 2, ends, said)
+            change, at = answer(jump.change, quantity, change=True), frame_name(rig, drive, jump.frame)
+            _add(jumps, [sum(axis.places[frame - 1 : frame + 1]) / 2] * 2, ends, f"jump by {change} at {at}")
     return [trace for trace in (band, means, jumps) if trace["x"]]
 
 
