@@ -69,7 +69,7 @@ def read_truth(path: str | Path) -> dict[str, KnownPose]:
     Raises
     ------
     InputError
-        The file cannot be read, has not these columns, or a line holds no angle.
+        The file cannot be read, has not these columns, or a line is not whole or holds no angle.
     UsageError
         Two frames have the same stem.
     """
@@ -88,12 +88,15 @@ def _rows(text: str, path: str | Path) -> Iterator[tuple[str, KnownPose]]:
         if missing:
             raise InputError(f"{path}: has no column {', '.join(missing)}: known angles are a CSV with both")
         for line in lines:
-            yield line["file"] or "", _known(line, f"{path}: line {lines.line_num}")
+            where = f"{path}: line {lines.line_num}"
+            if None in line or None in line.values():  # the file is cut, or a comma is a decimal point
+                raise InputError(f"{where}: has not as many values as there are columns")
+            yield line["file"], _known(line, where)
     except csv.Error as error:
         raise InputError(f"{path}: line {lines.line_num}: is not CSV: {error}") from error
 
 
-def _known(line: Mapping[str, str | None], where: str) -> KnownPose:
+def _known(line: Mapping[str, str], where: str) -> KnownPose:
     bends = bool(line.get("curvature_per_m")) and _number(line, "curvature_per_m", where) != 0
     pitch, height = (
         _number(line, name, where) if line.get(name) and not bends else None
@@ -104,8 +107,8 @@ def _known(line: Mapping[str, str | None], where: str) -> KnownPose:
     return KnownPose(math.radians(_number(line, "roll_deg", where)), pitch, height, bends, scale)
 
 
-def _number(line: Mapping[str, str | None], name: str, where: str) -> float:
-    text = line[name] or ""  # None where the line is short
+def _number(line: Mapping[str, str], name: str, where: str) -> float:
+    text = line[name]
     try:
         number = float("" if "_" in text else text)  # `1_0` is Python's notation
     except ValueError:
