@@ -44,11 +44,9 @@ def run_conversion(options: ConvertOptions) -> ExitStatus:
     """
     running = options.running
     frames = _plan(options)
-    paths_of = partial(outputs.every_path, writes=options.writes)
-    given = [*filter(None, [options.result]), *calibration_files(options.calibration)]
-    if outputs.listed_only(
-        lambda: chain([(given, ())], ((each.reads(), paths_of(each)) for each in frames)), running
-    ):
+    written = partial(outputs.every_path, writes=options.writes)
+    given = [([*filter(None, [options.result]), *calibration_files(options.calibration)], ())]
+    if outputs.listed_only(lambda: chain(given, ((each.reads(), written(each)) for each in frames)), running):
         return ExitStatus.DONE
     require_scheduler(running.scheduler)
     progress = Progress(len(frames), options, statuses=("ok",))
