@@ -105,7 +105,7 @@ def _find_rows(frames: Sequence[Frame], options: ConvertOptions) -> Sequence[Row
     if isinstance(options, HeightsOptions) and any(frame.calibration is None for frame in posed):
         options.running.note(
             f"{options.result}: was made with a calibration: give it with --calib; without it heights are in "
-            "camera heights, and off where the road has camber and the principal point is not in the middle"
+            "camera heights, and off with a doffs, or where camber meets a principal point beside the middle"
         )
     return rows
 
