@@ -238,9 +238,8 @@ class MethodOptions(NamedTuple):
             name.removesuffix("_deg"): math.radians(value) if name.endswith("_deg") else value
             for name, value in self._asdict().items()
         }
-        if calibration is not None:
-            given |= {"middle": calibration.cx, "doffs": calibration.doffs}
-        return Request(**given, slope_error=slope_error)
+        middle, doffs = (None, 0.0) if calibration is None else (calibration.cx, calibration.doffs)
+        return Request(**given, slope_error=slope_error, middle=middle, doffs=doffs)
 
 
 class ImageOptions(NamedTuple):
