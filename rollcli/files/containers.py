@@ -111,13 +111,16 @@ def bag_files(location: str) -> list[str]:
     return [f"{location.rstrip('/')}/{name}" for name in names if name.lower().endswith(BAGS)]
 
 
-def refuse_packed(location: str) -> None:
-    """Refuse an archive whose members cannot be read one by one, as those of one in a store.
+def refuse_others(location: str) -> None:
+    """Refuse a bag outside of INPUTS, and an archive whose members cannot be read one by one.
 
     Raises
     ------
     UsageError
     """
+    if location.lower().endswith(BAGS):
+        hint = "name it among INPUTS, not in a list; its views by --left-topic and --right-topic"
+        raise UsageError(f"{location}: is a bag: {hint}")
     if is_archive(base_name(location)):
         require_local(location, "archives are read from local disk: download it first")
     if location.lower().endswith(_PACKED):

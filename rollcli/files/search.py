@@ -15,7 +15,7 @@ from pathlib import Path
 
 from rollcli.errors import UsageError, as_usage, reading
 from rollcli.files.atomic import is_file, is_folder, mode_of
-from rollcli.files.containers import file_of, frame_name, is_archive, members, refuse_packed
+from rollcli.files.containers import file_of, frame_name, is_archive, members, refuse_others
 from rollcli.files.stores.locations import base_name, is_object_url, is_url, public_name, split_url
 from rollcli.files.stores.objects import has_objects, list_objects
 
@@ -149,7 +149,7 @@ class Search:
         if is_folder(path):
             return self._wanted(argument, self._in_folder(path), "folder")
         if literal or not glob.has_magic(argument) or os.path.lexists(path):
-            refuse_packed(argument)
+            refuse_others(argument)
             if is_archive(argument) and is_file(path):
                 return self._wanted(argument, self._in_archive(argument), "archive")
             return self._named(argument, frame_name(path.name) if "#" in argument else path.name)
@@ -284,7 +284,7 @@ class Search:
         """Yield the objects behind a URL: one, or those of a prefix or pattern that are readable."""
         pattern = not literal and is_object_url(url) and glob.has_magic(url)
         if not pattern and (literal or not is_folder_url(url)):
-            refuse_packed(url)
+            refuse_others(url)
             return self._named(url, base_name(url))
         folder = f"{url.rstrip('/')}/"
         if folder in self._skipped_urls:

@@ -127,11 +127,7 @@ def mask_finder(mask: str | None) -> Callable[[str], str | None]:
     if mask is not None and is_place(mask):
         found = find_inputs([mask], Search(recursive=True))
         by_stem = gathered((_stem(each.name), each.location) for each in found)
-
-        def of(name: str) -> str | None:
-            return None if _is_broken(name) else _only(by_stem, _stem(name), "mask", name, mask)
-
-        return of
+        return lambda name: None if _is_broken(name) else _only(by_stem, _stem(name), "mask", name, mask)
     if mask is not None and not (is_url(mask) or is_file(file_of(mask))):
         raise UsageError(f"{mask}: no such mask file or folder")
     return lambda name: mask
@@ -228,7 +224,7 @@ def check_depth(frames: Sequence[Frame], options: FramesOptions) -> None:
     if options.encoding.encoding == "depth" and not options.paired and any(lacking):
         raise UsageError(
             "--encoding depth needs a focal length and a baseline, which turn a depth into a disparity: "
-            "give --calib, or --focal, --principal-point and --baseline"
+            "give --calib, or what is missing of --focal, --principal-point and --baseline"
         )
 
 
@@ -241,9 +237,8 @@ def _read(
 ) -> Calibration:
     if len(paths) > 2:
         raise UsageError("--calib is given at most twice: for the left and the right view of ROS")
-    fetched = fetched or {}
     names = [shown(public_name(path)) for path in paths]
-    data = [fetched.get(path) or read_bytes(path, most=MAX_BYTES) for path in paths]
+    data = [(fetched or {}).get(path) or read_bytes(path, most=MAX_BYTES) for path in paths]
     return parse_calibration([*zip(names, map(as_utf8, data, names), strict=True)], given)
 
 
@@ -266,7 +261,7 @@ def find_frames(options: FramesOptions) -> Sequence[Frame]:
     make, numbers = _frame_maker(options), itertools.count()
     named = _pairs(options) if options.paired else _maps(options)
     # what is broken is always taken
-    return [make(*each) for each in named if is_rest(each[0].location) or next(numbers) % given.every == 0]
+    return [make(*each) for each in named if _is_broken(each[0].location) or next(numbers) % given.every == 0]
 
 
 def _maps(options: FramesOptions) -> Iterator[_Named]:
@@ -371,6 +366,8 @@ def _frames_of(left: Input, right: Input, layout: Layout | None) -> list[tuple[I
     """List the frames of two videos, or of one that holds both views; images are a pair themselves."""
     if not (is_video(left.location) or is_video(right.location)):
         return [(left, right)]
+    if packed := next((each.name for each in (left, right) if file_of(each.location) != each.location), None):
+        raise UsageError(f"{packed}: is a video in an archive: unpack it")
     from rollcli.files.recordings.video import frames_of
 
     return frames_of(left, right, layout)
@@ -408,15 +405,9 @@ def _behind(name: str) -> list[str]:
 
 
 def _in_bags(bags: _Bags, options: FramesOptions) -> Iterator[_Named]:
-    from rollcli.files.recordings.frames import maps_of_bag, pairs_of_bag
+    from rollcli.files.recordings.frames import frames_of_bag
 
-    left, right, milliseconds = options.topics
-    if left is not None and right is not None:
-        tolerance = round(milliseconds * 1e6)
-        found = [pairs_of_bag(files, name, left, right, tolerance) for name, files in bags]
-    else:
-        found = [maps_of_bag(files, name, options.inputs.topic) for name, files in bags]
-    for bag in found:
+    for bag in [frames_of_bag(files, name, options.inputs.topic, *options.topics) for name, files in bags]:
         known, given = bag.calibration, options.calibration
         options.running.note(*bag.notes, *([] if given.given else bag.uncalibrated))
         known = None if known is None or given.calib else with_numbers(known, given)

@@ -21,7 +21,6 @@ from rollcli.rig.calibration import Calibration
 
 _VIEWS = (IMAGE, COMPRESSED)
 _RAW = "image_raw"
-_SIDES = ("left", "right")
 _NO_P = "no CameraInfo with a principal point (P) in the image: no pitch and no height without --calib"
 _NO_LEFT = "no CameraInfo of the left view, but with a negative Tx: no pitch and no height without --calib"
 
@@ -56,6 +55,21 @@ class _Found:
     cameras: dict[str, CameraInfo]
     places: dict[tuple[str, str], str]
     broken: list[tuple[str, str]]
+
+
+def frames_of_bag(
+    files: Sequence[str], name: str, topic: str | None, left: str | None, right: str | None, tolerance: float
+) -> BagFrames:
+    """Find the pairs of two topics, whose stamps differ by so many ms at most; without these, the maps.
+
+    Raises
+    ------
+    UsageError
+        See `pairs_of_bag` and `maps_of_bag`.
+    """
+    if left is not None and right is not None:
+        return pairs_of_bag(files, name, left, right, round(tolerance * 1e6))
+    return maps_of_bag(files, name, topic)
 
 
 def maps_of_bag(files: Sequence[str], name: str, topic: str | None) -> BagFrames:
@@ -144,9 +158,8 @@ def pairs_of_bag(files: Sequence[str], name: str, left: str, right: str, toleran
 
 def is_disparity_image(path: str, member: str) -> bool:
     """Tell whether a frame is one; its disparities are x_l - x_r - (cx_l - cx_r) already."""
-    with contextlib.suppress(InputError):  # its row says so
-        topic = opened(path).topics.get(split_position(member)[0].rpartition("@")[0])
-        return topic is not None and topic.type == DISPARITY
+    with contextlib.suppress(InputError, KeyError):  # its row says so
+        return opened(path).topics[split_position(member)[0].rpartition("@")[0]].type == DISPARITY
     return False
 
 

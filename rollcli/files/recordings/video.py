@@ -64,7 +64,7 @@ def _look_through(path: str, size: int, modified_ns: int, process: int, name: st
     while decoder.grab():
         count += 1
     broken = broken_end(path)
-    if count == 0:
+    if count == 0 or not (decode or _Decoder(path, name, _ONE_THREAD).grab()):
         raise InputError(f"{name}: has no frame that can be decoded{broken and f'; it {broken}'}")
     return Video(count, decoder.width, decoder.height, broken)
 
