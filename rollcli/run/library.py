@@ -17,7 +17,7 @@ from rollcli.estimator.request import DEFAULT_REQUEST, LearningRate, Request
 from rollcli.extras import require_extra
 from rollcli.files.codecs.pictures import views_of
 from rollcli.files.containers import bag_files, is_video
-from rollcli.files.encodings import to_disparity
+from rollcli.files.encodings import Encoding, to_disparity
 from rollcli.files.formats import Stored, read_image, read_stored
 from rollcli.files.naming import Input
 from rollcli.rig.calibration import Calibration
@@ -286,14 +286,15 @@ def open_recording(
     ...
     rollcli.errors.UsageError: rolls.csv: is no .bag, .db3, .mcap or rosbag2 folder
     """
-    from rollcli.files.recordings.frames import maps_of_bag, pairs_of_bag
+    from rollcli.files.recordings.frames import frames_of_bag
 
     name = os.fspath(path)
-    layout = side_by_side if is_video(name) else None
+    if (encoding != "auto" or scale is not None) and (left_topic or is_video(name)):
+        raise UsageError(f"{name}: encoding and scale are of maps, and these are views")
     if is_video(name):
         if topic or left_topic or right_topic:
             raise UsageError(f"{name}: is a video, and has no topics: give side_by_side or right")
-        frames, camera = _of_videos(name, None if right is None else os.fspath(right), layout), None
+        frames, camera = _of_videos(name, None if right is None else os.fspath(right), side_by_side), None
     else:
         files = bag_files(name)
         if not files:
@@ -303,23 +304,21 @@ def open_recording(
             raise UsageError(f"{name}: is a bag: give topic, or left_topic and right_topic, and nothing else")
         if not 0 <= sync_tolerance < math.inf:
             raise UsageError(f"a sync_tolerance of {sync_tolerance} s: give 0 or more")
-        if left_topic is not None and right_topic is not None:
-            found = pairs_of_bag(files, name, left_topic, right_topic, round(sync_tolerance * 1e9))
-        elif left_topic is not None or right_topic is not None:
+        if (left_topic is None) is not (right_topic is None):
             raise UsageError("left_topic and right_topic are given together")
-        else:
-            found = maps_of_bag(files, name, topic)
+        found = frames_of_bag(files, name, topic, left_topic, right_topic, 1000 * sync_tolerance)
         frames, camera = found.frames, found.calibration
     for one, other in frames:
         if other is None:
-            stored = read_stored(one.location, one.name)
+            stored = read_stored(one.location, one.name, rgb=encoding == Encoding.FOUNDATIONSTEREO)
             read = to_disparity(stored, encoding=encoding, scale=scale, calibration=camera)
             yield RecordedFrame(one.name, one.stamp, read.disparity, None, None, camera)
         else:
             left = read_image(one.location, one.name)
-            views = (
-                views_of(left, layout, one.name) if layout else (left, read_image(other.location, other.name))
-            )
+            if side_by_side:
+                views = views_of(left, side_by_side, one.name)
+            else:
+                views = left, read_image(other.location, other.name)
             yield RecordedFrame(one.name, one.stamp, None, *views, camera)
 
 

@@ -2,9 +2,8 @@
 
 import math
 import struct
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -26,6 +25,13 @@ _VIDEO_STARTS = (b"\0\0\1", b"\0\0\0\1")  # start codes of H.264 and H.265 [ITU-
 _AS_VIDEO = "export the topic as .mp4, and read the video"
 _ONLY_MAPS = ("16UC1", "16SC1", "32FC1")
 MAP_ENCODINGS = ("mono16", *_ONLY_MAPS)  # of images that hold disparities or depths
+# ROS names the first two pixels of a row of the mosaic, OpenCV those of its second row from the second on
+_BAYER = {
+    "rggb": cv2.COLOR_BayerBG2BGR,
+    "bggr": cv2.COLOR_BayerRG2BGR,
+    "gbrg": cv2.COLOR_BayerGR2BGR,
+    "grbg": cv2.COLOR_BayerGB2BGR,
+}
 # numpy's dtype, and the channels
 _PIXELS = {
     **dict.fromkeys(("mono8", "8UC1"), ("u1", 1)),
@@ -36,20 +42,13 @@ _PIXELS = {
     **dict.fromkeys(("rgb8", "bgr8", "8UC3"), ("u1", 3)),
     **dict.fromkeys(("rgba8", "bgra8", "8UC4"), ("u1", 4)),
     **dict.fromkeys(("rgb16", "bgr16"), ("u2", 3)),
+    **{f"bayer_{order}{8 * size}": (f"u{size}", 1) for order in _BAYER for size in (1, 2)},
 }
 _FISHEYE = ("equidistant", "fisheye")
 _MODELS = ("plumb_bob", "rational_polynomial", *_FISHEYE)  # that OpenCV undoes
-# ROS names the first two pixels of a row of the mosaic, OpenCV those of its second row from the second on
-_BAYER = {
-    "rggb": cv2.COLOR_BayerBG2BGR,
-    "bggr": cv2.COLOR_BayerRG2BGR,
-    "gbrg": cv2.COLOR_BayerGR2BGR,
-    "grbg": cv2.COLOR_BayerGB2BGR,
-}
 
 
-@dataclass(frozen=True)
-class CameraInfo:
+class CameraInfo(NamedTuple):
     """The intrinsics of one camera: of the raw view (D, K, R) and of the rectified one (P); ROS's names."""
 
     width: int
@@ -68,8 +67,8 @@ class CameraInfo:
     @property
     def usable(self) -> bool:
         """Whether P is a calibration: a region of the image need not hold the principal point."""
-        inside = 0 < self.p[2] < (self.width or math.inf) and 0 < self.p[6] < (self.height or math.inf)
-        return self.has_p and inside
+        width, height = self.width or math.inf, self.height or math.inf
+        return self.has_p and 0 < self.p[2] < width and 0 < self.p[6] < height
 
     @property
     def across(self) -> float:
@@ -114,15 +113,12 @@ def camera_info(topic: Topic, data: memoryview) -> CameraInfo:
     """Decode a CameraInfo; of a camera that sends a region of its image, that of the region."""
     found = _decoded(topic, data)
     keys = "DKRP" if topic.encoding == "ros1" else "dkrp"  # ROS 1 calls them by capitals
-    fields = {key.lower(): tuple(map(float, getattr(found, key))) for key in keys}
-    of, roi = found, found.roi
-    if roi.width and roi.height:  # K and P are those of the whole image [sensor_msgs/CameraInfo]
-        of = roi
-        for key in "kp":
-            rows = np.reshape(fields[key], (3, -1))
-            rows[:2] -= np.outer((roi.x_offset, roi.y_offset), rows[2])
-            fields[key] = tuple(rows.ravel().tolist())
-    return CameraInfo(int(of.width), int(of.height), str(found.distortion_model), **fields)
+    d, k, r, p = (np.array(getattr(found, key), np.float64) for key in keys)
+    of = found.roi if found.roi.width and found.roi.height else found
+    for rows in (k.reshape(3, 3), p.reshape(3, 4)) if of is found.roi else ():  # are of the whole image
+        rows[:2] -= np.outer((of.x_offset, of.y_offset), rows[2])
+    fields = (tuple(each.tolist()) for each in (d, k, r, p))
+    return CameraInfo(int(of.width), int(of.height), str(found.distortion_model), *fields)
 
 
 def image_encoding(topic: Topic, data: memoryview) -> str:
@@ -173,8 +169,7 @@ def content_of(topic: Topic, data: memoryview, raw_of: CameraInfo | None = None)
         return _rectified(decode(packed), raw_of)
     if topic.type == DISPARITY:
         values = _pixels(found.image)
-        least = float(found.min_disparity)
-        below = values < least
+        below = values < float(found.min_disparity)
         known = np.isfinite(values)  # ZED's are all negative, and NaN where there are none
         if values.ndim == 2 and values.dtype.kind == "f" and below.any() and (known & ~below).any():
             values = np.where(below, np.nan, values).astype(values.dtype)
@@ -235,13 +230,9 @@ def _decoder(ros1: bool) -> Any:
 def _pixels(image: Any) -> NDArray[Any]:
     """Return the pixels of an Image: (H, W), or BGR (H, W, 3); rows may be longer than their pixels."""
     encoding, width, height, step = str(image.encoding), int(image.width), int(image.height), int(image.step)
-    bayer, bits = encoding[6:10], encoding[10:]
-    if encoding.startswith("bayer_") and bayer in _BAYER and bits in ("8", "16"):
-        kind, channels = f"u{int(bits) // 8}", 1
-    elif encoding in _PIXELS:
-        kind, channels = _PIXELS[encoding]
-    else:
+    if encoding not in _PIXELS:
         raise InputError(f"has pixels of the encoding {encoding[:40]!r}, which is not read")
+    kind, channels = _PIXELS[encoding]
     dtype = np.dtype(kind).newbyteorder(">" if image.is_bigendian else "<")
     row = width * channels * dtype.itemsize
     if step < row:
@@ -256,7 +247,7 @@ def _pixels(image: Any) -> NDArray[Any]:
     if channels > 1:
         values = values.reshape(height, width, channels)[..., :3]
         return np.ascontiguousarray(values[..., ::-1] if encoding.startswith("rgb") else values)
-    return cv2.cvtColor(values, _BAYER[bayer]) if encoding.startswith("bayer_") else values
+    return cv2.cvtColor(values, _BAYER[encoding[6:10]]) if encoding.startswith("bayer_") else values
 
 
 def _rectified(values: NDArray[Any], info: CameraInfo) -> NDArray[Any]:

@@ -38,13 +38,12 @@ def image(store, values, encoding, stamp, number=0, padding=0):
 
 def disparity_image(store, values, stamp, number=0, focal=700.0, baseline=0.5, least=0.0):
     """A DisparityImage, as stereo_image_proc fills it."""
-    roi = store.types["sensor_msgs/msg/RegionOfInterest"](0, 0, 0, 0, False)
     name = "T" if store is ROS1 else "t"
     return store.types["stereo_msgs/msg/DisparityImage"](
         header=header(store, stamp, number),
         image=image(store, values.astype(np.float32), "32FC1", stamp, number),
         f=focal,
-        valid_window=roi,
+        valid_window=store.types["sensor_msgs/msg/RegionOfInterest"](0, 0, 0, 0, False),
         min_disparity=least,
         max_disparity=128.0,
         delta_d=0.0,
@@ -62,7 +61,6 @@ def camera_info(store, stamp, size, p, d=(), k=None, r=None, number=0, region=(0
     }
     if store is ROS1:
         values = {key.upper(): each for key, each in values.items()}
-    roi = store.types["sensor_msgs/msg/RegionOfInterest"](*region, False)
     return store.types["sensor_msgs/msg/CameraInfo"](
         header=header(store, stamp, number),
         height=size[1],
@@ -70,7 +68,7 @@ def camera_info(store, stamp, size, p, d=(), k=None, r=None, number=0, region=(0
         distortion_model="plumb_bob",
         binning_x=0,
         binning_y=0,
-        roi=roi,
+        roi=store.types["sensor_msgs/msg/RegionOfInterest"](*region, False),
         **values,
     )
 
@@ -102,6 +100,5 @@ def write_bag(folder, name, kind, make, compression=None):
             serialize = store.serialize_ros1 if store is ROS1 else store.serialize_cdr
             writer.write(connections[topic], time, serialize(message, kind_of))
     if kind in ("db3", "mcap"):
-        inside = next(path.glob(f"*.{kind}"))
-        return inside.rename(folder / f"{name}.{kind}")
+        return next(path.glob(f"*.{kind}")).rename(folder / f"{name}.{kind}")
     return path
