@@ -103,12 +103,12 @@ def bag_files(location: str) -> list[str]:
     if location.lower().endswith(BAGS) and not is_folder(location):
         require_local(location)
         return [location]
-    if not is_file(os.path.join(location, "metadata.yaml")):  # noqa: PTH118
-        return []
-    names = sorted(os.listdir(location), key=natural_key)  # noqa: PTH208
-    if packed := [name for name in names if name.lower().endswith((".db3.zstd", ".mcap.zstd"))]:
-        raise UsageError(f"{location}: its file {packed[0]} is compressed as a whole; unpack it by zstd -d")
-    return [f"{location.rstrip('/')}/{name}" for name in names if name.lower().endswith(BAGS)]
+    is_bag = is_file(os.path.join(location, "metadata.yaml"))  # noqa: PTH118
+    names = sorted(os.listdir(location), key=natural_key) if is_bag else []  # noqa: PTH208
+    files = [f"{location.rstrip('/')}/{name}" for name in names] or [location]
+    if packed := next((each for each in files if each.lower().endswith((".db3.zstd", ".mcap.zstd"))), None):
+        raise UsageError(f"{packed}: is compressed as a whole; unpack it by zstd -d")
+    return [each for each in files if is_bag and each.lower().endswith(BAGS)]
 
 
 def refuse_others(location: str) -> None:

@@ -353,7 +353,7 @@ def test_a_bag_of_several_files_is_one_drive(tmp_path):
     assert "split_0.mcap: has no" not in said
     (folder / "split_1.mcap").rename(folder / "split_1.mcap.zstd")
     refusal = rollcli("estimate", "split", cwd=tmp_path).refused()
-    assert "split: its file split_1.mcap.zstd is compressed as a whole; unpack it by zstd -d" in refusal
+    assert "split/split_1.mcap.zstd: is compressed as a whole; unpack it by zstd -d" in refusal
 
 
 @pytest.mark.parametrize(
