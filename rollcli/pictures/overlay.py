@@ -93,12 +93,9 @@ def draw_preview(disparity: NDArray[Any]) -> Pixels:
 
 
 def as_bgr(photo: NDArray[Any], size: tuple[int, int]) -> Pixels:
-    """Return a new BGR image, uint8, of a camera image, grey or BGR, uint8 or uint16, at (width, height).
-
-    Cameras leave some of 16 bits unused: what is bright in the image is white.
-    """
+    """Return a new BGR image, uint8, of a camera image, grey or BGR, uint8 or uint16, at (width, height)."""
     pixels = photo
-    if photo.dtype != np.uint8:
+    if photo.dtype != np.uint8:  # cameras leave some of 16 bits unused: what is bright in the image is white
         white = max(float(np.percentile(photo[::_EVERY, ::_EVERY], _BRIGHT)), 1.0)
         pixels = cv2.convertScaleAbs(photo, alpha=255 / white)
     if pixels.shape[1::-1] != size:

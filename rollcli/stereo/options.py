@@ -112,8 +112,7 @@ class StereoOptions:
     @cached_property
     def is_default(self) -> bool:
         """Whether the match itself is left to the program."""
-        given = replace(self, downscale=1.0, align="auto", vertical_offset=None)
-        return given == StereoOptions()
+        return replace(self, downscale=1.0, align="auto", vertical_offset=None) == StereoOptions()
 
     def for_smaller(self, factor: int) -> "StereoOptions":
         """Return these options for views `factor` times smaller."""

@@ -109,8 +109,8 @@ class ColumnEvidence:
         Of scale, tilt, bend and curve: inverse covariance of what the blocks tell, the rest being free.
     told : ndarray, shape (4,)
         The same, times their values.
-    offset, twist : float
-        As in a misalignment: px, 1/pixels.
+    offset, rotation, twist : float
+        As in a misalignment: px, radians, 1/pixels.
     twist_variance : float
     unevenness : float
         Variance of what the lens leaves at the border, px^2.
@@ -127,6 +127,7 @@ class ColumnEvidence:
     information: Floats
     told: Floats
     offset: float
+    rotation: float
     twist: float
     twist_variance: float
     unevenness: float
@@ -148,6 +149,7 @@ class ColumnEvidence:
             information=np.sum([each.information for each in pairs], axis=0),
             told=np.sum([each.told for each in pairs], axis=0),
             offset=float(np.mean([each.offset for each in pairs])),
+            rotation=float(np.mean([each.rotation for each in pairs])),
             twist=float(np.average([each.twist for each in pairs], weights=sure)),
             twist_variance=float(1 / sure.sum()),
             unevenness=float(np.mean([each.unevenness for each in pairs])),
@@ -287,6 +289,7 @@ def column_evidence(rows: MeasuredRows, spread: float) -> ColumnEvidence:
         information=information,
         told=right[told] - through @ right[other],
         offset=float(fit.values[0]),
+        rotation=float(fit.values[1] / x),
         twist=float(fit.values[3] / (x * y)),
         twist_variance=float(variance * fit.inverse[3, 3] / (x * y) ** 2),
         unevenness=max(0.0, float(beyond.mean())),
@@ -311,6 +314,7 @@ def column_support(seen: ColumnEvidence) -> ColumnSupport:
         seen.told,
         np.array([lens / y**2, 0, 0, lens / y**4]),
         seen.offset / np.square(np.array(BELIEF.focal) * width),
+        seen.rotation,
     )
     yaw, skew = np.square(np.array([BELIEF.yaw, BELIEF.skew]) / (_FOCAL * width))
     # how many times likelier the shapes are those of a lens than none; a yaw makes none
@@ -351,7 +355,7 @@ def _yaw_of_twist(twist: float, error: float, yaw: float, skew: float, ratio: fl
 
 
 def _mean_over_causes(
-    information: Floats, told: Floats, lens: Floats, pitches: Floats
+    information: Floats, told: Floats, lens: Floats, pitches: Floats, rotation: float
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return mean and standard deviation of scale and of pitch over all choices of causes.
 
@@ -365,6 +369,8 @@ def _mean_over_causes(
         Variances of what the lens leaves in each.
     pitches : ndarray
         Curves that the offset would have, were it a pitch, 1/px.
+    rotation : float
+        Of the rows, radians: a left camera that is rolled has as large a tilt, and a right one none.
     """
     has = np.array([BELIEF.has_scale, BELIEF.has_tilt, BELIEF.has_bend])
     may = np.array([BELIEF.may_scale, BELIEF.may_tilt, BELIEF.may_bend])
@@ -378,11 +384,11 @@ def _mean_over_causes(
     chances = np.stack([np.log(np.where(causes, often, 1 - often)).sum(axis=1) for often in (has, may)])
     chances -= np.linalg.slogdet(spread)[1] / 2
 
-    curves = np.append(0.0, pitches)
+    known = np.array([(0.0, tilt, 0.0, curve) for tilt in (0.0, rotation) for curve in (0.0, *pitches)])
     how_often = np.append(1 - BELIEF.pitch, np.full(len(pitches), BELIEF.pitch / len(pitches)))
-    rest = told - np.outer(curves, information[:, 3])
+    rest = told - known @ information
     values = np.einsum("cij,pj->cpi", covariance, rest)
-    fits = np.log(how_often) + told[3] * curves - information[3, 3] * np.square(curves) / 2
+    fits = np.log(np.tile(how_often, 2)) + ((told + rest) * known).sum(axis=1) / 2
     likely = chances[:, :, None] + fits + np.einsum("pi,cpi->cp", rest, values) / 2
     shares = np.exp(likely - likely.max(axis=(1, 2), keepdims=True))
     believed, doubted = shares / shares.sum(axis=(1, 2), keepdims=True)
@@ -392,7 +398,7 @@ def _mean_over_causes(
         return mean, float(np.sqrt((doubted * (np.square(values - mean) + variance)).sum()))
 
     scale_variances = np.square(own) * covariance[:, 0, 0] + own * lens[0]
-    return summed(own[:, None] * values[..., 0], scale_variances[:, None]), summed(curves, 0.0)
+    return summed(own[:, None] * values[..., 0], scale_variances[:, None]), summed(known[:, 3], 0.0)
 
 
 class _Frame(NamedTuple):
