@@ -63,7 +63,10 @@ class BeliefTuning:
     lens_shape, no_shape : float
         Shapes of second and third degree at the border of what was seen, px, standard deviations: of rows
         that a lens has skewed alone (KITTI's grey cameras: 0.11 along x²), and of others (rendered: 0.02).
-    may_scale, may_tilt, may_bend, may_skew : float
+    has_left : float
+        How often rows are turned since the left camera is rolled against the baseline, and not the right one.
+        At 0.1, right views of empty roads that are turned and larger are off by up to 0.26 degrees, not 0.05.
+    may_scale, may_tilt, may_bend, may_skew, may_left : float
         The same as the interval has it. Where the rows cannot tell two causes apart, it reaches both of them;
         0.35 makes twice the standard deviation of a scale all of it, where a tilt is as likely as a bend.
     least : float
@@ -88,10 +91,12 @@ class BeliefTuning:
     has_skew: float = 0.1
     lens_shape: float = 0.1
     no_shape: float = 0.02
+    has_left: float = 0.01
     may_scale: float = 0.5
     may_tilt: float = 0.1
     may_bend: float = 0.35
     may_skew: float = 0.3
+    may_left: float = 0.1
     least: float = 0.0001
     tiles: float = 2.0
 
@@ -388,8 +393,9 @@ def _mean_over_causes(
     how_often = np.append(1 - BELIEF.pitch, np.full(len(pitches), BELIEF.pitch / len(pitches)))
     rest = told - known @ information
     values = np.einsum("cij,pj->cpi", covariance, rest)
-    fits = np.log(np.tile(how_often, 2)) + ((told + rest) * known).sum(axis=1) / 2
-    likely = chances[:, :, None] + fits + np.einsum("pi,cpi->cp", rest, values) / 2
+    left = np.array([(1 - often, often) for often in (BELIEF.has_left, BELIEF.may_left)])
+    fits = np.log(np.kron(left, how_often)) + ((told + rest) * known).sum(axis=1) / 2
+    likely = chances[:, :, None] + fits[:, None] + np.einsum("pi,cpi->cp", rest, values) / 2
     shares = np.exp(likely - likely.max(axis=(1, 2), keepdims=True))
     believed, doubted = shares / shares.sum(axis=(1, 2), keepdims=True)
 

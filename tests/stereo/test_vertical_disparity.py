@@ -227,8 +227,8 @@ def test_a_tilt_and_a_bend_are_in_no_column(field):
 def test_what_a_plain_road_cannot_tell_apart_is_doubted():
     told, plain = (support_of(lambda x, y, near: 0.001 * y, below_horizon=each) for each in (False, True))
     assert plain.error > 2 * told.error
-    left_rolled = support_of(lambda x, y, near: 0.005 * (x + near), below_horizon=True)
-    assert abs(left_rolled.scale) < 0.0002
+    left_rolled = support_of(lambda x, y, near: 0.008 * (x + near), below_horizon=True)
+    assert abs(left_rolled.scale) < 1.2 * left_rolled.error  # standard errors; 1.6 where that is no cause
 
 
 @pytest.mark.parametrize("pitch_deg", [-0.2, 0.2])
