@@ -215,9 +215,10 @@ class _Fitted:
         """Return the stretches with their values."""
         found = []
         for place, (first, end) in enumerate(bounds_of(self._starts, self._cells.frames)):
-            frames = ((first + end - 1) / 2, first, end - 1) if self._drift else (first,)  # else alike
-            values = [self.estimate(self.level(place, each)) for each in frames] * (3 // len(frames))
-            found.append(Segment(first, end - 1, int(self._series.used[first:end].sum()), *values))
+            mean, last = self.estimate(self.level(place, (first + end - 1) / 2)), end - 1
+            ends = [self.estimate(self.level(place, each)) for each in (first, last) if self._drift]
+            used = int(self._series.used[first:end].sum())
+            found.append(Segment(first, last, used, mean, *(ends or [mean, mean])))
         return found
 
     def mean_over(self, first: int, end: int) -> Estimate:
