@@ -168,7 +168,7 @@ def _figures(errors: NDArray[np.float64], count: int) -> Accuracy:
 
 
 def assess_heights(
-    rows: Sequence[Row], known: Mapping[str, KnownPose], heights: str, truth: str
+    rows: Sequence[Row], known: Mapping[str, KnownPose], heights: str, truth: str, disparity: str
 ) -> dict[int, Accuracy] | None:
     """Compare the heights over the road with true ones at `DISTANCES_M`, matched by stem.
 
@@ -179,8 +179,8 @@ def assess_heights(
         By stem.
     heights : str
         The folder that `estimate --heights` wrote.
-    truth : str
-        The folder with `heights/` and `disparity/`, as `simulate` writes it.
+    truth, disparity : str
+        The folders of true heights and disparities, as `simulate` writes them.
 
     Returns
     -------
@@ -197,7 +197,7 @@ def assess_heights(
     """
     folders = [
         {stem_of(each.name): each.location for each in find_inputs([folder], Search(recursive=True))}
-        for folder in (heights, f"{truth}/heights", f"{truth}/disparity")
+        for folder in (heights, truth, disparity)
     ]
     errors: dict[int, list[NDArray[np.float64]]] = {distance: [] for distance in DISTANCES_M}
     worst = dict.fromkeys(DISTANCES_M, 0.0)
@@ -342,10 +342,12 @@ def run_accuracy(options: AccuracyOptions) -> ExitStatus:
     """
     result, truth, running = options.result, options.truth, options.running
     writes = [] if is_stream(options.output) else [options.output]
-    if listed_only(lambda: [([result, truth], writes)], running):
-        return ExitStatus.DONE
     read, known = read_result(result), read_truth(truth)
-    found = replace(assess(read.rows, known, result), heights=_heights(read, known, options))
+    folders = _height_folders(read, options)
+    if listed_only(lambda: [([result, truth, *folders], writes)], running):
+        return ExitStatus.DONE
+    heights = _heights(read.rows, known, folders, options)
+    found = replace(assess(read.rows, known, result), heights=heights)
     if not running.quiet:
         _name_unmatched(found, options)
         _count_bent(read.rows, known, truth)
@@ -354,15 +356,22 @@ def run_accuracy(options: AccuracyOptions) -> ExitStatus:
     return ExitStatus.FRAMES_FAILED if found.no_angle else ExitStatus.DONE
 
 
-def _heights(read: Result, known: Mapping[str, KnownPose], options: AccuracyOptions) -> dict[int, Accuracy]:
-    """Compare the heights over the road of a folder that was named, or of that of the run."""
+def _height_folders(read: Result, options: AccuracyOptions) -> tuple[str, ...]:
+    """Return where heights lie, those that were named or that the run wrote; true ones; their disparity."""
     heights, beside = options.heights, os.path.dirname(options.truth) or "."  # noqa: PTH120 (also of a URL)
     if heights is None:
         heights = recorded_options(read.run, run_path(options.result)).images.heights
         if heights is None or not (is_folder(heights) and is_folder(f"{beside}/heights")):
-            return {}
+            return ()
+    return heights, f"{beside}/heights", f"{beside}/disparity"
+
+
+def _heights(
+    rows: Sequence[Row], known: Mapping[str, KnownPose], folders: Sequence[str], options: AccuracyOptions
+) -> dict[int, Accuracy]:
+    """Compare the heights over the road in these folders."""
     try:
-        found = assess_heights(read.rows, known, heights, beside)
+        found = assess_heights(rows, known, *folders) if folders else {}
     except InputError as error:
         if options.heights is not None:
             raise
@@ -370,8 +379,8 @@ def _heights(read: Result, known: Mapping[str, KnownPose], options: AccuracyOpti
         return {}
     if found is None:
         options.running.note(
-            f"{heights}: no heights are compared: they need metres (estimate --calib), and the truth columns "
-            "focal_px and baseline_m"
+            f"{folders[0]}: no heights are compared: they need metres (estimate --calib), and the truth "
+            "columns focal_px and baseline_m"
         )
     return found or {}
 

@@ -56,7 +56,8 @@ def run_paper(options: PaperOptions) -> ExitStatus:
     kind = options.experiments.figure
     names = [f"{name}.{kind}" for name in FIGURES] if kind is not None else []
     writes = [within(folder, name) for name in (*(f"{name}.csv" for name in TABLES), *names, PAGE)]
-    reads = [path for frame in frames for path in frame.reads()]
+    known = filter(None, [options.experiments.truth])
+    reads = [*known, *(path for frame in frames for path in frame.reads())]
     if listed_only(lambda: [(reads, writes)], options.running):
         return ExitStatus.DONE
     return _run(frames, truth, options)

@@ -1,7 +1,7 @@
 """`rollcli rig` from the command line: what is read and written, and the exit status."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
@@ -231,14 +231,17 @@ def run_rig(options: RigOptions) -> int:
     if options.output == options.correction == STREAM:
         raise UsageError("--correction and the answer cannot both go to stdout: name a file for one of them")
     check_options(options.gates)
-    if listed_only(lambda: [([*reads, *calibration_files(options.calibration)], writes)], options.running):
-        return 0
     rig, missing, notes = _assessed(options.results, options)
     after, changes = None, dict[str, Estimate]()
     if options.against is not None:
         after, later, more = _assessed([options.against], options)
         missing, notes = missing or later, [*notes, *more]
         changes = {each.name: difference(rig.now(each), after.now(each), each) for each in QUANTITIES}
+    pairs = [] if options.correction is None else list(_pairs(rig, options.results))
+    reads += calibration_files(options.calibration)
+    reads += [path for frame, _ in pairs for path in frame.reads()]
+    if listed_only(lambda: [(reads, writes)], options.running):
+        return 0
     calibration = calibration_finder(options.calibration)(rig.frames.files[-1])
     last, downscale = options.results[-1], 1.0
     if calibration is not None:
@@ -253,7 +256,7 @@ def run_rig(options: RigOptions) -> int:
     found = Findings(rig, checks, after, changes, health)
     texts = [(options.output, FORMATS[options.format](found))]
     if options.correction is not None:
-        rows = None if health is None else rows_of_drive(rig, options.results)
+        rows = None if health is None else rows_of_drive(pairs)
         texts.append((options.correction, correction_text(health, rows, options.results)))
         if rows is None:
             options.running.note(f"{options.correction}: {NO_COLUMNS}")
@@ -275,8 +278,8 @@ _PAIRS = 24  # matched again, a few seconds: 8 of rendered roads tell a scale to
 _FEWEST = 4
 
 
-def rows_of_drive(rig: RigAssessment, paths: Sequence[str]) -> DriveRows | None:
-    """Match some pairs of the last drive again, and put together what their rows say.
+def rows_of_drive(pairs: Iterable[tuple[Frame, FrameOptions]]) -> DriveRows | None:
+    """Match pairs of a drive again, and put together what their rows say.
 
     One pair of an empty road cannot tell a right view that is larger from rows that are bent; the pairs of a
     drive can, for its rig is one since its last jump.
@@ -287,7 +290,7 @@ def rows_of_drive(rig: RigAssessment, paths: Sequence[str]) -> DriveRows | None:
         Pixels of the size matched at; None where too few of the pairs can be read here.
     """
     found: list[Measured] = []
-    for frame, options in _pairs(rig, paths):
+    for frame, options in pairs:
         try:
             match = read_source(frame, options).match
         except FRAME_ERRORS:  # the pairs that are left may be enough

@@ -31,7 +31,7 @@ def test_heights_are_compared_at_their_distances_where_all_that_takes_is_there(t
         (tmp_path / name).mkdir(parents=True)
         for frame in ("frame1", "frame2", "frame3")[: 2 if name == "truth/heights" else 3]:
             np.save(tmp_path / name / f"{frame}.npy", values)
-    places = str(tmp_path / "made"), str(tmp_path / "truth")
+    places = [str(tmp_path / each) for each in ("made", "truth/heights", "truth/disparity")]
     known = {f"frame{k}": KnownPose(0.0, focal_baseline=100.0) for k in (1, 2, 3)}
     first, second, third = rows(1, 1, 1, ending=".npy")  # the second has no metres, the third no truth
     of_metres = [dataclasses.replace(first, height_m=1.5), second, dataclasses.replace(third, height_m=1.5)]
@@ -60,15 +60,12 @@ def test_the_worst_height_is_the_worst_of_all_pixels(tmp_path):
     off = np.zeros((300, 400), np.float32)
     off[::2, 1] = 0.5  # 120,000 pixels at 5 m: every third would be taken
     off[7, 9] = -2.0
-    for name, values in (
-        ("made", off),
-        ("truth/heights", 0 * off),
-        ("truth/disparity", np.full_like(off, 20)),
-    ):
-        (tmp_path / name).mkdir(parents=True)
-        np.save(tmp_path / name / "frame1.npy", values)
+    places = [tmp_path / each for each in ("made", "truth/heights", "truth/disparity")]
+    for place, values in zip(places, (off, 0 * off, np.full_like(off, 20)), strict=True):
+        place.mkdir(parents=True)
+        np.save(place / "frame1.npy", values)
     known = {"frame1": KnownPose(0.0, focal_baseline=100.0)}
     row = dataclasses.replace(rows(1, ending=".npy")[0], height_m=1.5)
-    found = assess_heights([row], known, str(tmp_path / "made"), str(tmp_path / "truth"))
+    found = assess_heights([row], known, *map(str, places))
     assert (7 * 400 + 9) % 3
     assert found[5].worst == 2
