@@ -346,8 +346,7 @@ def run_accuracy(options: AccuracyOptions) -> ExitStatus:
     folders = _height_folders(read, options)
     if listed_only(lambda: [([result, truth, *folders], writes)], running):
         return ExitStatus.DONE
-    heights = _heights(read.rows, known, folders, options)
-    found = replace(assess(read.rows, known, result), heights=heights)
+    found = replace(assess(read.rows, known, result), heights=_heights(read.rows, known, folders, options))
     if not running.quiet:
         _name_unmatched(found, options)
         _count_bent(read.rows, known, truth)
