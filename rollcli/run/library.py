@@ -270,6 +270,13 @@ def open_recording(
     right : str or path, optional
         The video of the right view, where `path` is that of the left one.
 
+    Yields
+    ------
+    RecordedFrame
+        With `name`, as rows have it; `stamp`, the time of its header (a pair's left one), ns, of a video 0; a
+        map as `disparity` (H, W), px, 0 is no data, or `left` and `right`, rectified, grey (H, W) or BGR
+        (H, W, 3); `calibration` of the rectified pair. What it lacks is None.
+
     Raises
     ------
     UsageError

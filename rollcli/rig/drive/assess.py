@@ -239,7 +239,7 @@ class RigAssessment:
         return None if drive is None else drive.quantities[quantity.name]
 
     def now(self, quantity: Quantity = ROLL) -> Estimate:
-        """Return the rig as it is: the mean of the last segment of the last drive."""
+        """Return the rig as it is: the mean of the last segment of the last drive, with a drift its end."""
         found = self.latest(quantity)
         return found.now if found is not None else Estimate()
 
@@ -267,6 +267,8 @@ def assess_rig(
     Returns
     -------
     RigAssessment
+        `now()` is the roll, degrees: its `value`, and `ci95`, half-width of the 95 % interval; None where
+        there is none. `latest()` has `segments`, `jumps` and `drift` of the last drive.
 
     Raises
     ------
