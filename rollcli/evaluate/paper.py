@@ -56,8 +56,7 @@ def run_paper(options: PaperOptions) -> ExitStatus:
     kind = options.experiments.figure
     names = [f"{name}.{kind}" for name in FIGURES] if kind is not None else []
     writes = [within(folder, name) for name in (*(f"{name}.csv" for name in TABLES), *names, PAGE)]
-    known = filter(None, [options.experiments.truth])
-    reads = [*known, *(path for frame in frames for path in frame.reads())]
+    reads = [*filter(None, [options.experiments.truth]), *(path for each in frames for path in each.reads())]
     if listed_only(lambda: [(reads, writes)], options.running):
         return ExitStatus.DONE
     return _run(frames, truth, options)

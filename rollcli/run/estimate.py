@@ -70,8 +70,7 @@ def _run(plan: Plan, resume_command: str) -> ExitStatus:
             return ExitStatus.INTERRUPTED
         if whole and not options.running.quiet:
             calibrated = (frame.calibration for frame in plan.frames if frame.calibration is not None)
-            downscale = output.record.read_as.downscale
-            if note := progress.summary.pose_note(next(calibrated, None), downscale):
+            if note := progress.summary.pose_note(next(calibrated, None), output.record.read_as.downscale):
                 progress.say(note)
             progress.say(progress.summary.rig_roll())
         return progress.summary.status

@@ -198,15 +198,15 @@ def check_first_size(frames: Sequence[Frame], options: FramesOptions) -> Calibra
             break
     else:
         return None
-    if first.calibration is None:
-        if width < height and layout == "left-right":
-            raise UsageError(
-                f"{first.file}: its views would be {width}x{height} px, higher than wide, as where both are "
-                "squeezed into one image, which changes angles: stretch them to twice their width, or give "
-                "estimate --calib, or --focal and --principal-point, of the views as they are"
-            )
+    fitting = None if first.calibration is None else first.calibration.for_size(width, height)
+    if width < height and layout == "left-right" and (fitting is None or fitting.at_edge):
+        raise UsageError(
+            f"{first.file}: its views would be {width}x{height} px, higher than wide, as where both are "
+            "squeezed into one image, which changes angles: stretch them to twice their width, or give "
+            "estimate --calib, or --focal and --principal-point, of the views as they are"
+        )
+    if first.calibration is None or fitting is None:
         return None
-    fitting = first.calibration.for_size(width, height)
     if doubt := first.calibration.seems_of_another_size(width, height):
         options.running.note(doubt)
     return fitting.for_size(*reversed(matched))

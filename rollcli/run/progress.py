@@ -10,6 +10,7 @@ import time
 from array import array
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from statistics import median
 from typing import Any, NamedTuple
 
@@ -17,7 +18,7 @@ from rollcli.errors import ExitStatus
 from rollcli.files.results import ALIGNMENT_COLUMNS, STATUSES, Row
 from rollcli.messages import say
 from rollcli.rig.calibration import Calibration
-from rollcli.rig.quantities import COLUMNS
+from rollcli.rig.quantities import COLUMNS, SIZE
 from rollcli.run.frame import FrameResult
 from rollcli.run.options import FramesOptions, RunningOptions
 from rollcli.stereo.misalignment import advice_of
@@ -134,12 +135,14 @@ class RunSummary:
 
         Maps were matched at 1/downscale of their images' size.
         """
-        pitch, height, width = map(self._median, ("pitch_deg", "height_m", "width"))
-        if calibration is None or pitch is None or width is None:
+        pitch, height, width, rows = map(self._median, ("pitch_deg", "height_m", *SIZE))
+        if calibration is None or pitch is None or width is None or rows is None:
             return ""
         from rollcli.rig.pose import taken_as_exact
 
         scale = 1 / downscale if calibration.width is None else width / calibration.width
+        if calibration.width is None:  # its numbers are for the images as they are
+            calibration = replace(calibration, width=round(width / scale), height=round(rows / scale))
         return taken_as_exact(calibration, math.radians(pitch), height, scale)
 
     def _median(self, name: str) -> float | None:

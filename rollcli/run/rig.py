@@ -238,8 +238,7 @@ def run_rig(options: RigOptions) -> int:
         missing, notes = missing or later, [*notes, *more]
         changes = {each.name: difference(rig.now(each), after.now(each), each) for each in QUANTITIES}
     pairs = [] if options.correction is None else list(_pairs(rig, options.results))
-    reads += calibration_files(options.calibration)
-    reads += [path for frame, _ in pairs for path in frame.reads()]
+    reads += calibration_files(options.calibration) + [path for frame, _ in pairs for path in frame.reads()]
     if listed_only(lambda: [(reads, writes)], options.running):
         return 0
     calibration = calibration_finder(options.calibration)(rig.frames.files[-1])

@@ -269,6 +269,7 @@ def test_what_is_no_usable_video_is_told_in_a_line(tmp_path, drive):
     (tmp_path / "header.mp4").write_bytes(b"\0\0\0\x18ftypisom" + np.random.default_rng(0).bytes(5000))
     (tmp_path / "list.mp4").write_text("#EXTM3U\nhttp://127.0.0.1:9/a.ts\n")
     (tmp_path / "empty.mp4").write_bytes(b"")
+    camera = ["--focal", "175", "--principal-point"]
     for given, expected in (
         (["drive.mkv"], "drive.mkv: is a video, of views and not of maps: give --side-by-side"),
         (["--left", "drive.mkv"], "--left and --right are given together"),
@@ -276,6 +277,7 @@ def test_what_is_no_usable_video_is_told_in_a_line(tmp_path, drive):
         (["drive.mkv", "--side-by-side", "--left", "a", "--right", "b"], "name pairs in one way"),
         (["odd.avi", "--side-by-side"], "odd.avi: is 101 px wide, which cannot be halved"),
         (["gone.png", "narrow.mkv", "--side-by-side"], ": its views would be 80x120 px, higher than wide"),
+        (["narrow.mkv", "--side-by-side", *camera, "79,60"], ": its views would be 80x120 px"),
         (["noise.mp4", "--side-by-side"], "noise.mp4: is no MP4, MOV, AVI or Matroska file"),
         (["header.mp4", "--side-by-side"], "header.mp4: cannot be opened"),
         (["list.mp4", "--side-by-side"], "list.mp4: is no MP4, MOV, AVI or Matroska file"),
@@ -286,8 +288,7 @@ def test_what_is_no_usable_video_is_told_in_a_line(tmp_path, drive):
         done = rollcli("estimate", *given, cwd=tmp_path)
         assert (done.status, done.out, done.err.count("\n")) == (2, "", 1), (given, done.err)
         assert expected in done.err, done.err
-    camera = ["--focal", "175", "--principal-point", "40,60"]  # of the views as they are: nothing is squeezed
-    done = rollcli("estimate", "narrow.mkv", "--side-by-side", *camera, cwd=tmp_path)
+    done = rollcli("estimate", "narrow.mkv", "--side-by-side", *camera, "40,60", cwd=tmp_path)
     assert len(rows(done.out)) == COUNT, done.err
 
 
