@@ -578,8 +578,8 @@ class VDisparityOptions(ConvertOptions):
     Attributes
     ----------
     bins : int or None
-        Columns of the histogram. [default: one a pixel of disparity for maps of whole pixels, else four;
-        256 to 1024]
+        Columns of the histogram. [default: one a pixel of disparity for maps of whole pixels, else four
+        and at least 256; at most 1024]
     max_disparity : float or None
         Right end of the histogram, pixels; its last bin also holds what lies beyond. [default: just above
         the map's largest]
