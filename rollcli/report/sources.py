@@ -2,7 +2,7 @@
 
 import bisect
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
@@ -178,13 +178,14 @@ class _ImageFolder:
         path, inside = Path(location), Path(self._location).resolve()
         return location if is_file(path) and path.resolve().is_relative_to(inside) else None
 
-    def is_one_of(self, names: Collection[str], recorded: str | None) -> bool:
-        """Tell whether it holds images itself: by its name, or since the run wrote them there."""
-        if self._objects is not None:
-            same = recorded is not None and recorded.rstrip("/") == self._location
-            return same or base_name(self._location) in names
-        place = Path(self._location).resolve()
-        return place.name in names or (recorded is not None and place == Path(recorded).resolve())
+    @property
+    def name(self) -> str:
+        """Its own name, without the folders above."""
+        return Path(self._location).resolve().name
+
+    def is_recorded(self, recorded: str | None, below: str = "") -> bool:
+        """Tell whether this folder, or one below it, is the one that the run wrote to."""
+        return recorded is not None and Path(self._location, below).resolve() == Path(recorded).resolve()
 
 
 def _images(row: Row, images: _ImageFolder, recorded: ImageOptions) -> dict[str, str]:
@@ -192,7 +193,7 @@ def _images(row: Row, images: _ImageFolder, recorded: ImageOptions) -> dict[str,
 
 
 def _image(kind: ImageKind, row: Row, images: _ImageFolder, recorded: ImageOptions) -> str | None:
-    for folder in _folders(kind.name, images, getattr(recorded, kind.name)):
+    for folder in _folders(kind.name, images, recorded):
         for name in _tails(row.file):
             for ending in (".png",) if kind.holds == "picture" else MAP_ENDINGS:
                 if found := images.find(f"{folder}{name}{ending}"):
@@ -203,14 +204,21 @@ def _image(kind: ImageKind, row: Row, images: _ImageFolder, recorded: ImageOptio
 _TRUE = ("disparity", "heights")  # beside the truth of a simulation they are not those of a run
 
 
-def _folders(kind: str, images: _ImageFolder, recorded: str | None) -> Iterator[str]:
-    """Yield where images of a kind may be: in the folder named, under the name it had or the option's."""
-    given = [] if recorded is None else [base_name(recorded.rstrip("/"))]
+def _folders(kind: str, images: _ImageFolder, recorded: ImageOptions) -> Iterator[str]:
+    """Yield where images of a kind may be: in the folder named, under the name it had or the option's.
+
+    Where the run wrote images of another kind to a folder of that name, only its own folder is this kind's.
+    """
+    places = {each.name: place.rstrip("/") for each in KINDS if (place := getattr(recorded, each.name))}
+    mine = places.get(kind)
+    others = {base_name(place) for place in places.values() if place != mine}
+    given = [] if mine is None else [base_name(mine)]
     usual = [] if kind in _TRUE and images.find(TRUTH) is not None else [kind]
     names = [name for name in dict.fromkeys([*given, *usual]) if name != ".."]
     for name in names:
-        yield f"{name}/"
-    if images.is_one_of(names, recorded):
+        if name not in others or images.is_recorded(mine, name):
+            yield f"{name}/"
+    if images.is_recorded(mine) or (images.name in names and images.name not in others):
         yield ""
 
 

@@ -86,6 +86,8 @@ _BETWEEN = {"polygon": " ", "heights-range": ":", "invalid": " --invalid "}  # v
 
 
 def _shown(value: Any, between: str = ",") -> str:
+    if value is True:  # of an option that is given alone
+        return ""
     if isinstance(value, list):
         return between.join(map(_shown, value))
     return f"{value:.15g}" if isinstance(value, float) else str(value)

@@ -346,7 +346,7 @@ def _chosen(count, jumps=(), rows=None):
     return [*choose(rows, count, jumps).items()]
 
 
-def _looked_for(rows, there="", images=None, derotated=None, result="rolls.csv", inside="."):
+def _looked_for(rows, there="", images=None, result="rolls.csv", inside=".", **folders):
     """Which files are those of rows, where such files and objects are there."""
     objects = [(each, 9) for each in there.split() if "://" in each]
     pairs = [each.partition("|") for each in rows.split()]
@@ -356,7 +356,7 @@ def _looked_for(rows, there="", images=None, derotated=None, result="rolls.csv",
         folder_of(each for each in there.split() if "://" not in each),
     ):
         os.chdir(inside)
-        recorded = FrameOptions(images=ImageOptions(derotated=derotated or None))
+        recorded = FrameOptions(images=ImageOptions(**{kind: each or None for kind, each in folders.items()}))
         found = made(subjects, given, result, images, recorded)
     if isinstance(found, str):
         return found
