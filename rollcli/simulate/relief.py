@@ -139,16 +139,15 @@ def lane_points() -> tuple[Array, Array, Array]:
     return lateral, z, 1 / z
 
 
-def lane_plane(relief: Relief) -> tuple[float, float, float]:
-    """Return height, slope to the right and slope ahead of the plane that fits the lane, metres.
+def lane_plane(relief: Relief) -> list[float]:
+    """Return height, slope to the right, slope ahead and half the curvature of what fits the lane, metres.
 
-    Its middle part, 1.2 m to each side and up to 20 m ahead; a curvature along the road is fitted with it.
+    Of its middle part, 1.2 m to each side and up to 20 m ahead.
     """
     lateral, z, weight = lane_points()
     used = (np.abs(lateral) < HALF_WIDTHS[1]) & (z < FAR_ENDS[1])
     design = np.array([np.ones_like(z), lateral, z, z * z])
-    level, right, ahead, _ = _fit(design, relief.height(lateral, z), weight * used)
-    return level, right, ahead
+    return _fit(design, relief.height(lateral, z), weight * used)
 
 
 def lane_rolls(points: Array, lateral: Array, ahead: Array, weight: Array) -> tuple[float, float]:

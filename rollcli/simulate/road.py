@@ -120,7 +120,7 @@ class Carriageway:
         """
         slope, rising = self.section.piece(0.0).slope, 0.0
         if self.relief is not None:
-            _, right, rising = lane_plane(self.relief)
+            _, right, rising, _ = lane_plane(self.relief)
             slope += right
         normal = np.array([-slope, 1.0, slope * self.course.heading - rising])
         return np.asarray(normal / np.linalg.norm(normal))
