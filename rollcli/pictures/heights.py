@@ -50,7 +50,7 @@ _SAMPLED = 125, 125  # rows and columns: twice as many move no height by 0.1 mm
 # in proportion: at first what a parabola leaves on the steepest hills, then half of a kerb
 _TOLERANCES = 0.12, 0.02
 _LEAST_SPREAD = 0.02  # px along the road
-_ROUNDS = 6  # of a fit
+_ROUNDS = 4  # of a fit, with each kind of weights
 _STEPS = 4096  # of the table of a profile, up to the bottom's disparity
 METRES, CAMERA_HEIGHTS = "metres", "camera heights"
 
@@ -349,21 +349,36 @@ def _profile_basis(x: NDArray[Any]) -> NDArray[Any]:
 
 
 def _steady_fit(design: Floats, values: Floats, found: Flags) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Fit values by least absolute deviations, then by Tukey's weights, six spreads wide; return those, too.
+    """Fit values by Tukey's weights, six spreads wide; return those, too.
 
-    Least squares would first follow a few bins at an end that lie on a kerb, and keep them.
+    They begin with what the values are, and with what least absolute deviations leave of them, which a hill
+    needs and which bend to a kerb where it alone lies nearer than the bottom. Of both fits that of the least
+    spread is taken.
     """
-    weights, middle = found.astype(np.float64), np.count_nonzero(found) // 2
-    for round_ in range(_ROUNDS):
-        normal = (design * weights[:, None]).T
-        fitted = np.linalg.solve(normal @ design, normal @ values)
-        off = np.abs(values - design @ fitted)
-        if round_ < _ROUNDS // 2:
-            weights = found / np.maximum(off, _LEAST_SPREAD)
-            continue
-        spread = max(1.4826 * float(np.sort(off[found])[middle]), _LEAST_SPREAD)
+    weights = found.astype(np.float64)
+    for _ in range(_ROUNDS):
+        _, off = _weighted_fit(design, values, weights)
+        weights = found / np.maximum(off, _LEAST_SPREAD)
+    fits = [_tukey_fit(design, values, found, start) for start in (np.abs(values), off)]
+    return min(fits, key=lambda fit: fit[0])[1:]
+
+
+def _tukey_fit(
+    design: Floats, values: Floats, found: Flags, off: NDArray[Any]
+) -> tuple[float, NDArray[Any], NDArray[Any]]:
+    """Return the spread of a fit that begins with how far values are off, the fit, and its weights."""
+    for _ in range(_ROUNDS):
+        spread = max(1.4826 * float(np.median(off[found])), _LEAST_SPREAD)
         weights = found * np.square(np.maximum(1 - np.square(off / (6 * spread)), 0))
-    return fitted, weights
+        fitted, off = _weighted_fit(design, values, weights)
+    return spread, fitted, weights
+
+
+def _weighted_fit(design: Floats, values: Floats, weights: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return a fit by least squares, and how far each value is off it."""
+    normal = (design * weights[:, None]).T
+    fitted = np.linalg.solve(normal @ design, normal @ values)
+    return fitted, np.abs(values - design @ fitted)
 
 
 def _cambered(d: Singles, across: Singles, road: FittedRoad) -> tuple[Singles, Singles, Singles]:

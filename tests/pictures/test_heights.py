@@ -109,6 +109,13 @@ def test_a_flattening_road_goes_on_straight():
     assert (np.diff(heights, axis=0) < 0).all()
 
 
+def test_a_kerb_that_alone_lies_nearer_than_the_bottom_is_no_hill():
+    road, model = road_of(0, 5, 0.4, 0, 0)
+    g = model.disparity(U - CENTRE[0], V - CENTRE[1])
+    d = np.where(U > 400, g / 0.9, g) + np.random.default_rng(1).normal(0, 0.05, g.shape)
+    assert np.median(np.abs(heights_over(d, road, None)[(g > 25) & (U < 400)])) < 0.002
+
+
 def road_over_a_hill(theta):
     """Disparities and distances of a road that falls by 0.0015 z^2 m, and the rig: no parabola fits it."""
     rig = Calibration(fx=400, fy=400, cx=CENTRE[0], cy=CENTRE[1], baseline=0.5)
