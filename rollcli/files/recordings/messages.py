@@ -45,6 +45,7 @@ _PIXELS = {
     **{f"bayer_{order}{8 * size}": (f"u{size}", 1) for order in _BAYER for size in (1, 2)},
 }
 _FISHEYE = ("equidistant", "fisheye")
+_ALIKE_PX = 1e-3  # K and P: far below what any calibration is worth
 _MODELS = ("plumb_bob", "rational_polynomial", *_FISHEYE)  # that OpenCV undoes
 
 
@@ -78,8 +79,9 @@ class CameraInfo(NamedTuple):
     @property
     def changes_raw_views(self) -> bool:
         """Whether a raw view is not the rectified one."""
-        upright = np.allclose(self.r, np.eye(3).ravel(), rtol=0, atol=1e-9)
-        return self.has_p and self.k[0] > 0 and (any(self.d) or (not upright and any(self.r)))
+        upright = not any(self.r) or np.allclose(self.r, np.eye(3).ravel(), rtol=0, atol=1e-9)
+        alike = np.allclose(self.k, np.delete(self.p, (3, 7, 11)), rtol=0, atol=_ALIKE_PX)
+        return self.has_p and self.k[0] > 0 and (any(self.d) or not upright or not alike)
 
 
 def stamp_of(topic: Topic, data: memoryview, log_time: int) -> int:
