@@ -10,6 +10,7 @@ import numpy as np
 from rollcli.rig.drive.posterior import TUNING, Flags, Likelihood, Series, correlations_at, make_cells
 
 _SIDE = 2.5  # cells on each side of a jump that are looked at again
+_NEAR = 1.5  # cells on each side that a jump is moved to then
 _FEWEST = 60  # frames on each side: what is beside a jump tells its levels
 # of a kick, at the end of the drive: one of which more is there has not faded, and a jump looks the same. In
 # drives of 30 frames a tenth of the jumps by ten times the noise was taken for such a kick
@@ -95,9 +96,15 @@ class _Search:
         # far enough from the others and from both ends
         edges = np.array([0, *found.starts, self.cells.frames])
         allowed: Flags = np.abs(first[:, None] - edges).min(axis=1) >= self._gap
+        one = self._likelihood.scan(design, fit)
+        # a jump too near to an end to be told would be taken for one farther from it, with a level of both
+        close = np.abs(first[:, None] - first) < self._gap
+        looked_at = _NEAR * self.cells.width if self.cells.width > 1 else 0
+        close &= np.minimum(first, self.cells.frames - first) < self._gap - looked_at
+        allowed &= one >= np.where(close, one, -np.inf).max(axis=1)
         if not allowed.any():
             return []
-        one = np.where(allowed, self._likelihood.scan(design, fit), -np.inf)
+        one = np.where(allowed, one, -np.inf)
         both = np.abs(first[:, None] - first) >= self._gap
         both &= allowed[:, None] & allowed
         two = np.where(both, self._likelihood.pairs(design, fit), -np.inf)
@@ -134,7 +141,7 @@ def _placed(series: Series, found: Found, whole: Likelihood) -> list[int]:
             part = series.part(begin, end)
             cells = make_cells(part, most=TUNING.cells // 2)
             likelihood, level = Likelihood(cells, whole.unit), np.ones((len(cells.first), 1))
-            near = np.abs(cells.first + begin - start) <= 1.5 * cell
+            near = np.abs(cells.first + begin - start) <= _NEAR * cell
             # behind many frames that do not count, those before the jump are not in this part
             if not near.any() or near[0] or cells.width >= cell:
                 break

@@ -12,13 +12,10 @@ SEEDS = range(4)
 
 @pytest.mark.slow
 def test_a_stable_drive_has_an_interval_that_holds_and_neither_jumps_nor_drift():
-    inside, jumps = 0, 0
-    for seed in range(20):
-        found = assess_sequence(*drive(seed))
-        inside += found.now.ci95 is not None and abs(found.now.value + 0.44) <= found.now.ci95
-        jumps += len(found.jumps) > 0
+    found = [assess_sequence(*drive(seed)) for seed in range(20)]
+    inside = sum(abs(each.now.value + 0.44) <= each.now.ci95 for each in found)
     assert inside >= 16  # 99.7 % of all twenties where 95 % are inside
-    assert jumps <= 2
+    assert sum(len(each.jumps) > 0 for each in found) <= 2
 
 
 @pytest.mark.parametrize("gap", mostly_slow([0, 300], 300))  # frames before it that have no angle
@@ -48,6 +45,11 @@ def test_a_jump_of_a_short_drive_is_no_kick_which_had_no_time_to_fade(seed, fram
     assert ([each.frame for each in found.jumps], found.used) == ([frames // 2], frames)
 
 
+@pytest.mark.parametrize(("frames", "behind"), [(200, 7), (1000, 10)])
+def test_a_jump_too_near_the_end_is_not_taken_for_one_before_it(frames, behind):
+    assert not assess_sequence(*drive(0, frames, phi=0.0, sd=0.05, jump=1.0, at=frames - behind)).jumps
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_drift_is_found_and_is_no_jump(seed):
     found = assess_sequence(*drive(seed, 4000, drift=1.0, sd=0.1))
@@ -57,10 +59,8 @@ def test_a_drift_is_found_and_is_no_jump(seed):
 
 @pytest.mark.slow
 def test_gross_outliers_called_ok_hardly_move_the_mean():
-    clean, soiled = [], []
-    for seed in range(6):
-        clean.append(assess_sequence(*drive(seed)).now.value + 0.44)
-        soiled.append(assess_sequence(*drive(seed, gross=0.05)).now.value + 0.44)
+    of = [[assess_sequence(*drive(seed, gross=share)).now.value for seed in range(6)] for share in (0, 0.05)]
+    clean, soiled = np.array(of) + 0.44
     assert np.std(soiled) <= 1.5 * np.std(clean)
     assert abs(np.mean(soiled)) <= 1.5 * max(abs(np.mean(clean)), np.std(clean) / 3)
 
