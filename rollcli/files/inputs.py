@@ -146,10 +146,11 @@ def _by_name(lefts: list[Input], rights: list[Input]) -> list[tuple[Input, Input
     paired = {side[at] for pair in matched for side, at in zip(places, pair, strict=True)}
     every = zip((*lefts, *rights), (*places[0], *places[1]), strict=True)
     alone = list(dict.fromkeys(each.name for each, place in every if place not in paired))
-    if not pairs and {*places[0]} == same_files:
+    # numbers of frames may look like a mark: frame_0002 and frame_0003
+    if alone and len(alone) >= len(paired) and {*places[0]} == same_files:
         raise UsageError(
-            f"--left and --right name the same images, and no name has a mark of its side (such as left and "
-            f"right, L1 and R1): {listed(each.name for each in lefts)}; {_OTHER_SIDE}"
+            "--left and --right name the same images, and most names have no mark of their side (such as "
+            f"left and right, L1 and R1): {listed(each.name for each in lefts)}; {_OTHER_SIDE}"
         )
     if alone:
         by_order = len(lefts) == len(rights) and not pairs
