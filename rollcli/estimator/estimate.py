@@ -194,7 +194,7 @@ def estimate_roll(
     alpha = pixels.energy.parabola(theta)
     height, width = checked.values.shape
     tangent = touch(alpha, theta, Grid.of_shape(height, width, request.middle), surface, knife)
-    turned = tangent.turned_by(request.slope_error)
+    turned = math.hypot(tangent.turned_by(request.slope_error), certified.off)
     interval = None if knife is None else interval_of(knife, theta, turned, tuning.interval)
     doubts, notes = list(doubts_of(checked, pixels, certified, interval, request)), []
     if certified.replaced is not None:

@@ -156,7 +156,9 @@ class CertifiedSolution:
     minima : list of Minimum
         Of the energy, the lowest first.
     is_global : bool
-        Whether no minimum is lower than the solution.
+        Whether no minimum is lower than the one that the solution is at, to ten times the solver's tolerance.
+    off : float
+        How far the solution is from the nearest minimum, radians.
     replaced : float or None
         The angle that the solver found, radians, where another minimum was meant.
     """
@@ -165,6 +167,7 @@ class CertifiedSolution:
     energy: float
     minima: list[Minimum]
     is_global: bool
+    off: float
     replaced: float | None = None
 
 
@@ -192,4 +195,6 @@ def certify(
             solution = replace(solution, theta=meant)
     value = energy.at(solution.theta).value
     slack = 1e-9 * (energy.rest + energy.slope_energy)
-    return CertifiedSolution(solution, value, found, value <= found[0].energy + slack, replaced)
+    off = min(angle_between(minimum.theta, solution.theta) for minimum in found)
+    near = angle_between(found[0].theta, solution.theta) == off <= 10 * tolerance
+    return CertifiedSolution(solution, value, found, near or value <= found[0].energy + slack, off, replaced)

@@ -171,3 +171,5 @@ def test_a_solution_within_ten_tolerances_of_the_minimum_stays(tolerance_deg, of
     found = certify(ENERGY, solution, LOWEST, math.radians(tolerance_deg))
     assert found.replaced == (solution.theta if replaced else None)
     assert found.solution.theta == (LOWEST if replaced else solution.theta)
+    assert found.off == pytest.approx(0 if replaced else math.radians(off_deg), abs=1e-9)
+    assert found.is_global
