@@ -46,7 +46,7 @@ _SPECKLE = 50, 2
 _SPARE = 9  # rows above the plane's horizon. Of 224 pairs, four were off by more
 _MOST_ABOVE = 0.6  # of the height. Of 248 pairs the road's first row was at 0.49 at most
 # Shares: of the small map below the horizon that lies on the plane, and of this that is found along it. On 41
-# real pairs 0.2 and 0.6, but for two where cars hide the road
+# real pairs 0.2 and 0.6, but for two where cars hide the road. Less will do where the whole range shows less
 _FEWEST_ON, _FEWEST_FOUND = 0.15, 0.5
 _AS_FAR = 3.0  # px: what is found there is as far off as the small map says
 
@@ -161,7 +161,15 @@ class Levelled:
     @cached_property
     def road(self) -> "_Near | None":
         """The rows that the road's plane reaches, matched along it; None where too little of it is found."""
-        return _match_along(self, self.plane, self.coarse) if self._wants_road and self.plane else None
+        near = _match_along(self, self.plane, self.coarse) if self._wants_road and self.plane else None
+        if near is None or (found := near.found(near.disparity)) >= _FEWEST_FOUND:
+            return near
+        return near if found > near.found(self._below) else None  # as at night, or where it is blurred
+
+    @cached_property
+    def _below(self) -> Map:
+        """The rows that the road's plane reaches, matched over the whole range."""
+        return match_below(self.whole, self.first, self.count, self.options, self.top)
 
     @property
     def lacks_road(self) -> bool:
@@ -190,7 +198,7 @@ class Levelled:
             disparity = self.coarse.copy()
             rows = disparity[self.top :]
             if near is None:
-                rows[:] = match_below(self.whole, first, count, options, self.top)
+                rows[:] = self._below
                 disparity = without_lag(disparity, options.mode)
             else:
                 np.copyto(rows, near.disparity, where=near.told)
@@ -234,10 +242,18 @@ class _Near(NamedTuple):
         Pixels; 0 where none is found.
     told : ndarray of bool
         Where the small map is near the plane, or shows nothing.
+    seen : ndarray of float32
+        What the small map shows near the plane, px; 0 elsewhere.
     """
 
     disparity: Map
     told: Bools
+    seen: Map
+
+    def found(self, disparity: Map) -> float:
+        """Return the share of what is seen near the plane that a match of these rows finds again."""
+        again = (disparity > 0) & (np.abs(self.seen - disparity) < np.float32(_AS_FAR)) & (self.seen > 0)
+        return float(np.count_nonzero(again) / np.count_nonzero(self.seen))
 
 
 def _match_along(pair: Levelled, plane: Plane, coarse: Map) -> _Near | None:
@@ -263,11 +279,9 @@ def _match_along(pair: Levelled, plane: Plane, coarse: Map) -> _Near | None:
     lies_on = np.abs(seen - straight) < np.float32(_NEAR * count)
     shown = seen > 0
     lies_on &= shown
-    on = np.count_nonzero(lies_on)
-    found = np.count_nonzero(lies_on & known & (np.abs(seen - disparity) < np.float32(_AS_FAR)))
-    if on < max(1, _FEWEST_ON * np.count_nonzero(shown)) or found < _FEWEST_FOUND * on:
+    if np.count_nonzero(lies_on) < max(1, _FEWEST_ON * np.count_nonzero(shown)):
         return None
-    return _Near(disparity * known, lies_on | ~shown)
+    return _Near(disparity * known, lies_on | ~shown, seen * lies_on)
 
 
 def _match_blocks(views: Views, count: int) -> NDArray[np.int16]:
