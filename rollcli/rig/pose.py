@@ -19,9 +19,14 @@ class IntervalTuning:
     factor : float
         On the root of the sum of squares: 0.94 to 0.96 of 180 rendered pairs are covered, and poses of 10 of
         11 real streets at full and at half size agree (tests/benchmarks/bench_pose.py).
+    uneven_pitch, uneven_height : float
+        Of the road's unevenness (`Jackknife.uneven`): radians, and share of the height. Of rendered roads of
+        ISO 8608's classes A to D, without it 0.1 to 0.2 are covered (tests/benchmarks/bench_pose.py).
     """
 
     factor: float = 0.77
+    uneven_pitch: float = 13.0
+    uneven_height: float = 38.0
 
 
 TUNING = IntervalTuning()
@@ -159,15 +164,21 @@ def taken_as_exact(calibration: Calibration, pitch: float, height: float | None,
 
 
 def _half_widths(tangent: Tangent, calibration: Calibration, pose: Pose) -> tuple[float | None, float | None]:
-    """Return those of pitch and height: the poses over the tangents that the jackknife leaves."""
-    changes = tangent.changes
-    if changes is None:
+    """Return those of pitch and height: the tangents that the jackknife leaves, and what uneven ground adds.
+
+    Of the height None where nothing is known of the ground.
+    """
+    changes, knife = tangent.changes, tangent.jackknife
+    if changes is None or knife is None:
         return None, None
     theta, row, disparity, slope = tangent.theta, tangent.row, tangent.disparity, tangent.slope
     moved = [
         pose_of(Tangent(theta + turned, row, disparity + nearer, slope + steeper), calibration)
         for nearer, steeper, turned in changes.tolist()
     ]
-    pitch = TUNING.factor * math.hypot(*(each.pitch - pose.pitch for each in moved))
-    heights = [each.height - pose.height for each in moved if each.height and pose.height]
-    return pitch, TUNING.factor * math.hypot(*heights) if heights else None
+    noise = TUNING.factor * math.hypot(*(each.pitch - pose.pitch for each in moved))
+    pitch = min(math.hypot(noise, TUNING.uneven_pitch * knife.uneven), math.pi / 2)
+    if pose.height is None or not math.isfinite(knife.uneven):
+        return pitch, None
+    noise = TUNING.factor * math.hypot(*(each.height - pose.height for each in moved if each.height))
+    return pitch, math.hypot(noise, TUNING.uneven_height * knife.uneven * pose.height)

@@ -1,6 +1,6 @@
 """How accurate and how honest pitch and height are: rendered pairs, KITTI 2012's streets, and the cost.
 
-    python tests/benchmarks/bench_pose.py [FRAMES [SIZE [SEED]]]
+    python tests/benchmarks/bench_pose.py [FRAMES [SIZE [SEED [ROUGHNESS]]]]
 
 FRAMES mixed scenes (100) of SIZE (640x480), matched by SGBM, with pitch from 2 to 7 degrees, height from 1.3
 to 1.8 m and a principal point up to 30 px off the centre. To reach: pitch median 0.03 and 95 % 0.08 degrees,
@@ -10,7 +10,8 @@ than 3 % of a frame's time.
 
 Pitch and height are those of the road near ahead, where the tangent touches it. A road of curvature k bends
 away by k z at the distance z: "at the tangent" compares with the road there, "below the camera" with the road
-under the camera, where that of a flat road is the same. "offset" is the mean error of the pitch as px of
+under the camera, where that of a flat road is the same. A road of a class of ROUGHNESS, A to E, bends as what
+fits its lane; the rest of it the intervals are to cover. "offset" is the mean error of the pitch as px of
 disparity: what the matcher errs by.
 """
 
@@ -28,6 +29,8 @@ from rollcli.errors import EstimationError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import with_pose
+from rollcli.simulate.build import carriageway_of
+from rollcli.simulate.relief import lane_plane
 from rollcli.stereo.match import StereoOptions
 
 SEED = 7714
@@ -43,9 +46,11 @@ def judged(frame: Matched):
     posed = with_pose(estimate_roll(frame.disparity), nominal)
     tangent = posed.tangent
     distance = spec.focal * spec.baseline / tangent.disparity
-    bend = math.atan(spec.curvature * distance)
+    relief = carriageway_of(spec).relief
+    curvature = spec.curvature + (0.0 if relief is None else 2 * lane_plane(relief)[3])
+    bend = math.atan(curvature * distance)
     pitch = spec.pitch + bend
-    above = (spec.height + spec.curvature * distance**2 / 2) * math.cos(bend)
+    above = (spec.height + curvature * distance**2 / 2) * math.cos(bend)
     off = posed.pitch - pitch
     return {
         "flat": spec.curvature == 0,
@@ -61,11 +66,18 @@ def judged(frame: Matched):
     }
 
 
-def rendered(frames: int, size: tuple[int, int], seed: int) -> None:
+def rendered(frames: int, size: tuple[int, int], seed: int, roughness: str | None) -> None:
     """Print the errors on rendered pairs."""
     rows = []
     for frame in matched(
-        frames, seed, 10, size, pitch_deg=(2, 7), height=(1.3, 1.8), principal_offset=(-30.0, 30.0)
+        frames,
+        seed,
+        10,
+        size,
+        pitch_deg=(2, 7),
+        height=(1.3, 1.8),
+        principal_offset=(-30.0, 30.0),
+        roughness=roughness,
     ):
         try:
             rows.append(judged(frame))
@@ -153,7 +165,8 @@ def main() -> None:
     width, height = map(int, (sys.argv[2] if len(sys.argv) > 2 else "640x480").split("x"))
     cost()
     streets()
-    rendered(frames, (width, height), int(sys.argv[3]) if len(sys.argv) > 3 else SEED)
+    seed, roughness = int(sys.argv[3]) if len(sys.argv) > 3 else SEED, next(iter(sys.argv[4:]), None)
+    rendered(frames, (width, height), seed, roughness)
 
 
 if __name__ == "__main__":
