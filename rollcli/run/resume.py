@@ -6,6 +6,7 @@ that are finished.
 
 import hashlib
 import json
+import math
 import os
 import uuid
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -130,7 +131,7 @@ class RunRecord:
             "counts": summary.totals if summary else {},
             **({_REPLACES: True} if self.replaces and not summary else {}),
         }
-        data = json.dumps(record, indent=2).encode() + b"\n"
+        data = json.dumps(record, indent=2, allow_nan=False).encode() + b"\n"
         write_bytes(results.run_path(self.plan.output), data, durable=True, owner=self.run)
         self._begun = True
 
@@ -140,6 +141,8 @@ def _effective(plan: Plan) -> dict[str, Any]:
     options = plan.options
     read = _by_name(options.stereo) if options.paired else _by_name(options.encoding)
     layout = options.pairs.side_by_side
+    if "invalid" in read:  # JSON has no numbers that are not finite
+        read["invalid"] = [each if math.isfinite(each) else str(each) for each in read["invalid"]]
     values = {**_by_name(options.method), **_by_name(options.region), **_by_name(options.images), **read}
     values |= {
         "format": plan.format,
