@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.simulate.materials import Values
-from rollcli.simulate.relief import FAR_ENDS, LEVEL, Dip, lane_plane
+from rollcli.simulate.relief import FAR_ENDS, LEVEL, Dip
 from rollcli.simulate.road import Carriageway, Piece, Site, cross_section, draw_asphalt, draw_carriageway
 from rollcli.simulate.scene import FAR, Light, Scene, draw_light
 from rollcli.simulate.spec import FrameSpec, Stream
@@ -156,8 +156,7 @@ def true_heights(scene: Scene, spec: FrameSpec, camera: Camera, view: View) -> V
     """Return how high the ground in a camera's view lies over the road, metres, (H, W); NaN for the rest.
 
     The road is the carriageway without dips, bumps and gutters, which goes on beyond its edges as it is at
-    them. A rough road is what fits its lane ahead, of which `lane_plane` tells, and farther on parallel to a
-    smooth one.
+    them. A rough road is what fits its lane ahead, and farther on parallel to a smooth one.
     """
     carriageway, smooth = carriageway_of(spec), replace(spec, gutter=0.0)
     section = cross_section(smooth, carriageway.left, carriageway.right, carriageway.course.bend)
@@ -170,7 +169,7 @@ def true_heights(scene: Scene, spec: FrameSpec, camera: Camera, view: View) -> V
     normal = -piece.slope_at(lateral) * course.across(points[2])
     normal[1] += 1.0
     normal[2] -= course.curvature * points[2]
-    _, right, ahead, bend = lane_plane(carriageway.relief or LEVEL)
+    _, right, ahead, bend = carriageway.fit_ahead
     near = np.minimum(points[2], FAR_ENDS[-1])
     road = piece.elevation(lateral) + right * lateral + (ahead + bend * near) * near
     heights = np.full(seen.shape, np.nan, np.float32)

@@ -113,15 +113,18 @@ class Carriageway:
         return (-1, self.left), (1, self.right)
 
     @property
+    def fit_ahead(self) -> list[float]:
+        """What `lane_plane` fits to the unevenness of the lane ahead, metres; zeros on a smooth road."""
+        return [0.0] * 4 if self.relief is None else lane_plane(self.relief)
+
+    @property
     def normal(self) -> Array:
         """The upward unit normal (3,) of the plane that touches the road where the rig stands.
 
         On a rough road: of the plane that fits the lane ahead, in place of what lies below the wheels.
         """
-        slope, rising = self.section.piece(0.0).slope, 0.0
-        if self.relief is not None:
-            _, right, rising, _ = lane_plane(self.relief)
-            slope += right
+        _, right, rising, _ = self.fit_ahead
+        slope = self.section.piece(0.0).slope + right
         normal = np.array([-slope, 1.0, slope * self.course.heading - rising])
         return np.asarray(normal / np.linalg.norm(normal))
 

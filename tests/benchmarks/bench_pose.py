@@ -30,7 +30,6 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import with_pose
 from rollcli.simulate.build import carriageway_of
-from rollcli.simulate.relief import lane_plane
 from rollcli.stereo.match import StereoOptions
 
 SEED = 7714
@@ -46,8 +45,7 @@ def judged(frame: Matched):
     posed = with_pose(estimate_roll(frame.disparity), nominal)
     tangent = posed.tangent
     distance = spec.focal * spec.baseline / tangent.disparity
-    relief = carriageway_of(spec).relief
-    curvature = spec.curvature + (0.0 if relief is None else 2 * lane_plane(relief)[3])
+    curvature = spec.curvature + 2 * carriageway_of(spec).fit_ahead[3]
     bend = math.atan(curvature * distance)
     pitch = spec.pitch + bend
     above = (spec.height + curvature * distance**2 / 2) * math.cos(bend)
