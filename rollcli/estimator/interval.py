@@ -100,7 +100,8 @@ def interval_of(jackknife: Jackknife, theta: float, turned: float, tuning: Inter
     theta : float
         Radians.
     turned : float
-        Standard deviation of an error that all pixels share, by which the map itself is turned, radians.
+        Standard deviation of an error that all pixels share, radians: by which the map itself is turned, and
+        the solver stopped beside the minimum.
     tuning : IntervalTuning
     """
     noise = tuning.factor * jackknife.noise(theta, tuning)

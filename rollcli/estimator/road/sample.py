@@ -16,7 +16,7 @@ from rollcli.estimator.tuning import SampleTuning
 NO_STEP = np.float32(np.inf)  # to a neighbour without data: it agrees with no road
 LEAST_PIXELS = 50  # away from the border; fewer hold no road
 _LEAST_VALUES = 12  # that have a median
-_TWICE = 2.001  # and a little: steps of whole pixels that were scaled, as by 0.1, differ in their last digits
+_TWICE = np.float32(2.001)  # and a little: scaled steps of whole pixels differ in their last digits
 _SMALLEST, _LARGEST = 1e-12, 1e12  # typical disparities whose squares single precision can add up
 _STEEP = np.float32(1e6)  # times the largest disparity; squares of slopes stay finite
 
@@ -178,7 +178,7 @@ def take_sample(
         few=few,
         column=column[few],
         coherent=coherent,
-        slopes=_slopes(steps, np.float32(_TWICE) * np.maximum(tolerance, np.float32(quantum)))
+        slopes=_slopes(steps, _TWICE * np.maximum(tolerance, np.float32(quantum)))
         * np.float32(grid.scale / reach),
         noise=noise,
         quantum=quantum,

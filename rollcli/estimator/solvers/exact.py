@@ -195,6 +195,7 @@ def certify(
             solution = replace(solution, theta=meant)
     value = energy.at(solution.theta).value
     slack = 1e-9 * (energy.rest + energy.slope_energy)
-    off = min(angle_between(minimum.theta, solution.theta) for minimum in found)
-    near = angle_between(found[0].theta, solution.theta) == off <= 10 * tolerance
-    return CertifiedSolution(solution, value, found, near or value <= found[0].energy + slack, off, replaced)
+    nearest = min(found, key=lambda minimum: angle_between(minimum.theta, solution.theta))
+    off = angle_between(nearest.theta, solution.theta)
+    is_global = value <= found[0].energy + slack or (nearest is found[0] and off <= 10 * tolerance)
+    return CertifiedSolution(solution, value, found, is_global, off, replaced)
