@@ -104,8 +104,10 @@ def bag_files(location: str) -> list[str]:
         require_local(location)
         return [location]
     is_bag = is_file(os.path.join(location, "metadata.yaml"))  # noqa: PTH118
-    names = sorted(os.listdir(location), key=natural_key) if is_bag else []  # noqa: PTH208
-    files = [f"{location.rstrip('/')}/{name}" for name in names] if is_bag else [location]
+    files = [location]
+    if is_bag:
+        names = sorted(os.listdir(location), key=natural_key)  # noqa: PTH208
+        files = [f"{location.rstrip('/')}/{name}" for name in names]
     if packed := next((each for each in files if each.lower().endswith((".db3.zstd", ".mcap.zstd"))), None):
         raise UsageError(f"{packed}: is compressed as a whole; unpack it by zstd -d")
     return [each for each in files if each.lower().endswith(BAGS)] if is_bag else []

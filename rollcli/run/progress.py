@@ -140,9 +140,11 @@ class RunSummary:
             return ""
         from rollcli.rig.pose import taken_as_exact
 
-        scale = 1 / downscale if calibration.width is None else width / calibration.width
         if calibration.width is None:  # its numbers are for the images as they are
+            scale = 1 / downscale
             calibration = replace(calibration, width=round(width / scale), height=round(rows / scale))
+        else:
+            scale = width / calibration.width
         return taken_as_exact(calibration, math.radians(pitch), height, scale)
 
     def _median(self, name: str) -> float | None:
