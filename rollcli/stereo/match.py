@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -14,6 +14,7 @@ from rollcli.errors import InputError
 from rollcli.estimator.road.find import road_plane
 from rollcli.stereo.alignment import Approach, Measured, SmallViews, level, textured_share
 from rollcli.stereo.along_road import FindRoad, Levelled
+from rollcli.stereo.correction import Correction
 from rollcli.stereo.first_look import FirstLook, first_look, look_for_range
 from rollcli.stereo.misalignment import LEVEL, NO_SUPPORT, TOLERANCE, ColumnSupport, Misalignment, Tolerance
 from rollcli.stereo.options import StereoOptions as StereoOptions
@@ -266,11 +267,7 @@ def match_pair(
         raise InputError(f"images {width} px wide cannot be matched, {_WIDEST} can: give --downscale 2")
     told = options.given_alignment(width, height)
     small, again = SmallViews(views, given), look is not None
-    if options.measures_alignment:
-        look = look or first_look(small)
-    elif options.num_disparities is None:
-        look = look or look_for_range((views[0], level(views[1], told.lies)))
-    look = look or FirstLook(None, None)
+    look = look or _look_at(small, options, told)
     count = options.num_disparities
     if count is None:
         count = (width // 8 if look.range is None else look.range) - first
@@ -284,47 +281,21 @@ def match_pair(
         tried.append(Levelled(views, lies, look.disparity, first, count, options, find_road, blank, before))
         return tried[-1].matched()
 
-    support, doubt = None, ""
     if options.measures_alignment:
-        matched, corrected, measured, doubt = _match_levelled(match, small, look, first < 0)
+        found = _match_levelled(match, small, look, first < 0)
     else:
-        corrected, measured, support = told.lies, None, told.columns
-        matched = match(corrected)
-        if options.checks_alignment:
-            measured = small.measure(matched, corrected)
-        if measured is not None:
-            lies, errors = measured.misalignment, measured.errors
-            # but for what refinement takes away
-            if _KEPT._replace(sure=4.0).allows(lies - corrected, errors, views[0].shape):
-                corrected = told.of_pair(lies.offset, errors.offset).rounded(*views[0].shape)
-            else:
-                doubt = CONTRADICTS
-    pair = tried[-1]
-    valid, at_end = cv2.countNonZero(matched), matched >= first + count - 2
-    if pair.road is not None:  # what is matched along the road's plane, no range ends
-        at_end[pair.top :] &= matched[pair.top :] != pair.road.disparity
-    end_fraction = np.count_nonzero(at_end) / valid if valid else 0.0
+        found = _match_as_told(match, small, told, check=options.checks_alignment)
+    pair, corrected = tried[-1], found.corrected
+    end_fraction = _share_at_end(found.disparity, pair)
     grows = usable_range(2 * count, first, width, options.block_size) > count
     if grows and end_fraction > MUCH_AT_END and options.num_disparities is None and not again:
         return match_pair(left, right, options, find_road, replace(look, range=first + 2 * count))
-    if corrected == LEVEL:
-        support = NO_SUPPORT
-    elif support is None:
-        support = NO_SUPPORT if measured is None else measured.support
-    if support.error > _OPEN_COLUMNS and not doubt:
-        doubt = NOT_TOLD_BY_ROWS
-    if support.pitch_error > _OPEN_PITCH and not doubt:
-        doubt = PITCH_NOT_TOLD
+    support, lies = found.support, found.left_to_refine(small.shape)
 
-    lies = corrected
-    if corrected == LEVEL and measured is not None and not doubt:  # too little to level the view for
-        seen = Misalignment(*measured.misalignment.parts[:2])
-        lies = LEVEL if _AS_GIVEN.allows(seen, measured.errors, views[0].shape) else seen
+    def finished(disparity: Map) -> Map:
+        return _with_believed_columns(refined(disparity, views, lies), corrected, support)
 
-    def finished(found: Map) -> Map:
-        return _with_believed_columns(refined(found, views, lies), corrected, support)
-
-    disparity = finished(matched)
+    disparity = finished(found.disparity)
     return StereoMatch(
         disparity=disparity,
         min_disparity=first,
@@ -332,18 +303,84 @@ def match_pair(
         end_fraction=end_fraction,
         corrected=corrected,
         larger=support.scale,
-        measured=measured,
+        measured=found.measured,
         lacks_road=pair.lacks_road,
         slope_error=support.error,
-        doubt=doubt,
+        doubt=found.doubt or _doubt_of_columns(support),
         match_whole=lambda: disparity if find_road is None else finished(pair.matched(whole=True)),
     )
 
 
+def _look_at(small: SmallViews, options: StereoOptions, told: Correction) -> FirstLook:
+    """Look at a pair for what is neither given nor told."""
+    if options.measures_alignment:
+        return first_look(small)
+    if options.num_disparities is None:
+        left, right = small.whole
+        return look_for_range((left, level(right, told.lies)))
+    return FirstLook(None, None)
+
+
+class _Matched(NamedTuple):
+    """A map before it is refined.
+
+    Attributes
+    ----------
+    disparity : ndarray of float32, shape (H, W)
+        Pixels; no data is 0.
+    corrected : Misalignment
+        What the right view was levelled by.
+    measured : Measured or None
+        How it lies; None where that was not asked, or could not be told.
+    doubt : str
+        Why the views may not be level now; empty if there is no reason.
+    told : ColumnSupport or None
+        What a drive says of the columns; None where the pair's own rows have to.
+    """
+
+    disparity: Map
+    corrected: Misalignment
+    measured: Measured | None
+    doubt: str = ""
+    told: ColumnSupport | None = None
+
+    @property
+    def support(self) -> ColumnSupport:
+        """What of the correction is in the columns."""
+        if self.corrected == LEVEL:
+            return NO_SUPPORT
+        if self.told is not None:
+            return self.told
+        return NO_SUPPORT if self.measured is None else self.measured.support
+
+    def left_to_refine(self, shape: tuple[int, ...]) -> Misalignment:
+        """Return how views of this shape lie, also where that was too little to level them for."""
+        if self.corrected != LEVEL or self.measured is None or self.doubt:
+            return self.corrected
+        seen = Misalignment(*self.measured.misalignment.parts[:2])
+        return LEVEL if _AS_GIVEN.allows(seen, self.measured.errors, shape) else seen
+
+
+def _match_as_told(
+    match: Callable[[Misalignment], Map], small: SmallViews, told: Correction, *, check: bool
+) -> _Matched:
+    """Match views that lie as is told, and `check` whether they do."""
+    disparity, corrected, doubt = match(told.lies), told.lies, ""
+    measured = small.measure(disparity, told.lies) if check else None
+    if measured is not None:
+        lies, errors = measured.misalignment, measured.errors
+        # but for what refinement takes away
+        if _KEPT._replace(sure=4.0).allows(lies - told.lies, errors, small.shape):
+            corrected = told.of_pair(lies.offset, errors.offset).rounded(*small.shape)
+        else:
+            doubt = CONTRADICTS
+    return _Matched(disparity, corrected, measured, doubt, told.columns)
+
+
 def _match_levelled(
     match: Callable[[Misalignment], Map], small: SmallViews, look: FirstLook, any_scene: bool
-) -> tuple[Map, Misalignment, Measured | None, str]:
-    """Match once the views are level; the map, what was corrected and measured, and why it may be wrong."""
+) -> _Matched:
+    """Match once the views are level."""
     seen, shape, looked_at = look.measured, small.shape, LEVEL
     if seen is not None and not TOLERANCE.allows(seen.misalignment, seen.errors, shape):
         looked_at = seen.misalignment
@@ -357,26 +394,40 @@ def _match_levelled(
         if not any_scene:
             check_same_scene(small, look, measured)
         if measured is None:
-            return disparity, at, look.measured, TOO_LITTLE
+            return _Matched(disparity, at, look.measured, TOO_LITTLE)
         # where this measurement and that before it lead to; level if either is
         lies, errors = measured.misalignment, measured.errors
         wanted = approach.next(at, lies)
         if TOLERANCE.allows(lies, errors, shape) or TOLERANCE.allows(wanted, errors, shape):
             wanted = LEVEL
         if wanted == at:
-            return disparity, at, measured, _doubt(at, errors)
+            return _Matched(disparity, at, measured, _doubt(at, errors))
         left = (lies - at).times(measured.spread / _KEPT_SPREAD)
         if wanted != LEVEL and _KEPT.allows(left, errors, shape):  # refinement does the rest
-            return disparity, lies, measured, _doubt(lies, errors)
+            return _Matched(disparity, lies, measured, _doubt(lies, errors))
         if matched == 1 and looked_at != LEVEL:  # which may have led astray
             wanted, approach = LEVEL, Approach(shape)
-    return disparity, at, measured, NOT_LEVELLED
+    return _Matched(disparity, at, measured, NOT_LEVELLED)
 
 
 def _doubt(corrected: Misalignment, errors: Misalignment) -> str:
     far = any(abs(part) > most for part, most in zip(corrected.parts[:3], _FURTHEST, strict=True))
     far |= abs(corrected.scale) > _UNUSUAL_SCALE and errors.offset > _UNUSUAL_ERROR
     return "the views lie too far from level to be sure of the correction" if far else ""
+
+
+def _doubt_of_columns(support: ColumnSupport) -> str:
+    if support.error > _OPEN_COLUMNS:
+        return NOT_TOLD_BY_ROWS
+    return PITCH_NOT_TOLD if support.pitch_error > _OPEN_PITCH else ""
+
+
+def _share_at_end(disparity: Map, pair: Levelled) -> float:
+    """Return the share of the valid pixels within a pixel of the end of the range."""
+    valid, at_end = cv2.countNonZero(disparity), disparity >= pair.first + pair.count - 2
+    if pair.road is not None:  # what is matched along the road's plane, no range ends
+        at_end[pair.top :] &= disparity[pair.top :] != pair.road.disparity
+    return float(np.count_nonzero(at_end) / valid) if valid else 0.0
 
 
 def _with_believed_columns(disparity: Map, matched: Misalignment, support: ColumnSupport) -> Map:

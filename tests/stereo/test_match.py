@@ -95,9 +95,9 @@ class Rig:
 
     def run(self, monkeypatch, look):
         monkeypatch.setattr(match, "check_same_scene", lambda *_: None)
-        disparity, corrected, _, doubt = match._match_levelled(self.match, self, FirstLook(20, look), False)
-        assert disparity[0, 0] == len(self.matched)  # the map of the last match
-        return round(corrected.offset, 3), doubt
+        found = match._match_levelled(self.match, self, FirstLook(20, look), False)
+        assert found.disparity[0, 0] == len(self.matched)  # the map of the last match
+        return round(found.corrected.offset, 3), found.doubt
 
 
 def lies(offset):
