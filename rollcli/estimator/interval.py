@@ -129,33 +129,21 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
     model = surface.model._replace(theta=theta)
     # in single precision, which takes a third less time: the angle itself does not come from here
     across, along = model.turned(np.array([surface.x, surface.y], np.float32))
-    weights = surface.weights.astype(np.float32)
+    plain = model.disparity_along(along)
+    nearest = float(plain.max())
     cambered = math.isfinite(surface.camber_precision)
     prior = surface.camber_precision if cambered else 0.0
-    plain = model.disparity_along(along)
-    rows = np.empty((6, len(along)), np.float32)
-    rows[0], rows[1], rows[2] = 1, along, along * along * surface.parabolic
-    model.turning(across, along, out=rows[3])
-    rows[4] = model.bulge(across, plain) if cambered else 0
-    rows[5] = surface.d - plain
-    nearest = float(plain.max())
+    rows = _design(surface, model, across, along, plain)
     heights = rows[5] / np.maximum(plain, _FARTHEST * nearest)
-    rows *= np.sqrt(weights)  # from here on all products are weighted
+    rows *= np.sqrt(surface.weights.astype(np.float32))  # from here on all products are weighted
 
     leverage = np.square(rows[3])
     bands, in_bands = _by_group(rows, along, None, tuning.groups)
     columns, in_columns = _by_group(rows, across, leverage, tuning.groups)
     quarter = in_bands * (2 * tuning.groups) + in_columns
     uneven = _unevenness(heights, leverage, quarter, tuning.groups, tuning.noise_falls)
-    cosine, sine, grid = abs(math.cos(theta)), abs(math.sin(theta)), surface.grid
-    # how wide it is across the road; the middle of the lane leaves a rolled one on one side
-    view = sum(surface.sides) * cosine + 2 * grid.centre_v / grid.scale * sine
-    width_at_1 = view * abs(model.alpha[1])  # in camera heights, where the disparity is 1 px
-    # where the middle of the lane leaves what was looked at
-    side = surface.sides[theta < 0]
-    leaves = min(surface.lowest / max(cosine, _LEAST_SPAN), side / max(sine, _LEAST_SPAN))
-    border = model.disparity_along(leaves)
     in_lane = _nearest_seen(plain[np.abs(model.side(across, plain)) < 1], 0.5 / tuning.groups) or nearest
+    width_at_1, border = _view(surface, model)
 
     total = bands.sum(0)
     inverse, whole, changes, bulge = _solved(total, np.concatenate([bands, columns]), prior)
@@ -176,6 +164,31 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
         bend=abs(model.camber * float(bulge[_THETA])),
         camber=_camber(model, prior_share, changes[:, _CAMBER]) if cambered else None,
     )
+
+
+def _design(surface: Surface, model: RoadModel, across: Reals, along: Reals, plain: Reals) -> Reals:
+    """Return the derivatives of the disparity by a0, a1, a2, theta and camber, and what is left: (6, N).
+
+    `plain` has the disparities of the model at these coordinates, px.
+    """
+    rows = np.empty((6, len(along)), np.float32)
+    rows[0], rows[1], rows[2] = 1, along, along * along * surface.parabolic
+    model.turning(across, along, out=rows[3])
+    rows[4] = model.bulge(across, plain) if math.isfinite(surface.camber_precision) else 0
+    rows[5] = surface.d - plain
+    return rows
+
+
+def _view(surface: Surface, model: RoadModel) -> tuple[float, float]:
+    """Return how wide the view is across the road where its disparity is 1 px, camera heights.
+
+    And the disparity, px, where the middle of the lane leaves what was looked at: a rolled view on one side.
+    """
+    cosine, sine, grid = abs(math.cos(model.theta)), abs(math.sin(model.theta)), surface.grid
+    across = sum(surface.sides) * cosine + 2 * grid.centre_v / grid.scale * sine
+    side = surface.sides[model.theta < 0]
+    leaves = min(surface.lowest / max(cosine, _LEAST_SPAN), side / max(sine, _LEAST_SPAN))
+    return across * abs(model.alpha[1]), model.disparity_along(leaves)
 
 
 def _nearest_seen(lane: Reals, share: float) -> float:
