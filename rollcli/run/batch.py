@@ -41,34 +41,25 @@ def do_frame(frame: Frame, options: FrameOptions) -> FrameResult:
     return run_frame(frame, options)
 
 
-def lost_frame(frame: Frame, reason: str, options: FrameOptions) -> FrameResult:
-    """Make the row of a frame whose worker died, and remove its files of an earlier run."""
-    write_outputs(frame, {}, options)
-    return failed_frame(frame, reason)
-
-
-def clear_frames(frames: Iterable[Frame], options: FrameOptions) -> None:
-    """Remove the halves of files that a worker left which died amid one of these frames."""
-    if not options.retry_of:  # they go when the row is written, with marks that are needed until then
-        remove_leftovers(files_of(frames, options.writes))
-
-
-def _decode(frame: Frame, options: FrameOptions) -> Frame:
-    from rollcli.run.read import decoded  # loads NumPy, which other runs leave to the workers
-
-    return decoded(frame, options)
-
-
 def work_on(frames: Iterable[Frame], options: FrameOptions, **further: Any) -> Work[Frame, FrameResult]:
     """Say what is done with frames; `further` are fields of `Work`."""
+
+    def lost(frame: Frame, reason: str) -> FrameResult:
+        write_outputs(frame, {}, options)  # its files of an earlier run go
+        return failed_frame(frame, reason)
+
+    def clear(some: Iterable[Frame]) -> None:
+        if not options.retry_of:  # halves of files go when the row is written, with marks needed until then
+            remove_leftovers(files_of(some, options.writes))
+
+    def prepare(frame: Frame) -> Frame:
+        from rollcli.run.read import decoded  # loads NumPy, which other runs leave to the workers
+
+        return decoded(frame, options)
+
     videos = any(frame.of_videos for frame in frames)
-    return Work(
-        partial(do_frame, options=options),
-        partial(lost_frame, options=options),
-        partial(clear_frames, options=options),
-        prepare=partial(_decode, options=options) if videos else None,
-        **further,
-    )
+    do = partial(do_frame, options=options)
+    return Work(do, lost, clear, prepare=prepare if videos else None, **further)
 
 
 def workers_for(frames: Sequence[Frame], options: FramesOptions, parts: Iterable[str] = ()) -> Workers:

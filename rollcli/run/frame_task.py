@@ -34,7 +34,7 @@ from rollcli.run.options import (
     VDisparityOptions,
 )
 from rollcli.run.outputs import possible_paths, roomy_path, write_outputs
-from rollcli.run.read import Source, guarded, read_source
+from rollcli.run.read import FRAME_ERRORS, Source, frame_of_error, read_source
 from rollcli.run.result_file import inputs_line
 
 TOO_LARGE_FOR_PNG = f"written as TIFF: a disparity is above the {KITTI_TOP:.0f} px of a KITTI PNG"
@@ -52,24 +52,29 @@ def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
         A file cannot be written, which ends the run.
     """
     start = time.perf_counter()
-    files: dict[str, bytes] = {}
-
-    def work() -> FrameResult:
-        _require_angle(frame, options)
-        source = read_source(frame, options)
-        make = _estimated if options.convert is None else _converted
-        row, made, warnings = make(frame, source, options)
-        files.update(made)  # last: a frame that fails has none
-        downscale = 1.0 if source.size is None else source.size[0] / source.disparity.shape[1]
-        return FrameResult(row, source.encoding, warnings, source.searched, downscale)
-
-    with noting(options.notes) as notes:
-        result = guarded(frame, work)
+    # numbers of damaged maps overflow: the row says what comes of them
+    with noting(options.notes) as notes, np.errstate(all="ignore"):
+        try:
+            result, files = _done(frame, options)
+        except FRAME_ERRORS as error:
+            result, files = frame_of_error(frame, error), {}
     write_outputs(frame, files, options)
     elapsed = 1000 * (time.perf_counter() - start)
     noted = {**notes, **(frame.decoded.notes if frame.decoded else {})}
     inputs = inputs_line(frame, noted, options) if options.notes else b""
     return replace(result, row=replace(result.row, elapsed_ms=elapsed), inputs=inputs)
+
+
+def _done(frame: Frame, options: FrameOptions) -> tuple[FrameResult, dict[str, bytes]]:
+    """Read a frame; return its row, and its files by path."""
+    # of the result that a conversion is given
+    if options.convert is not None and frame.row is not None and frame.row.map_roll_deg is None:
+        raise InputError(f"{frame.file}: has no angle in {options.convert.result}")
+    source = read_source(frame, options)
+    make = _estimated if options.convert is None else _converted
+    row, files, warnings = make(frame, source, options)
+    downscale = 1.0 if source.size is None else source.size[0] / source.disparity.shape[1]
+    return FrameResult(row, source.encoding, warnings, source.searched, downscale), files
 
 
 def _estimated(frame: Frame, source: Source, options: FrameOptions) -> _Made:
@@ -201,17 +206,6 @@ def encode_heights(heights: NDArray[np.float32], save_as: str, unit: str) -> byt
     """Encode heights over the road as a float32 TIFF, which names their unit, or NPY."""
     form = "npy" if save_as == "npy" else "tiff"
     return encode_stored(heights, form, text=f"height over the road, {unit}")
-
-
-def _require_angle(frame: Frame, options: FrameOptions) -> None:
-    """Refuse a frame whose row in the result that a conversion is given has no angle.
-
-    Raises
-    ------
-    InputError
-    """
-    if options.convert is not None and frame.row is not None and frame.row.map_roll_deg is None:
-        raise InputError(f"{frame.file}: has no angle in {options.convert.result}")
 
 
 def _converted(frame: Frame, source: Source, options: FrameOptions) -> _Made:

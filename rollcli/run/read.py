@@ -3,9 +3,9 @@
 import contextlib
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import cv2
@@ -353,30 +353,19 @@ def matched_source(
 
 def road_finder(allowed: NDArray[np.bool_] | None, request: Request) -> "FindRoad | None":
     """Return what finds the road of a pair, if that is asked; `allowed` has the shape that is matched at."""
-    return partial(_road, allowed, request) if request.road == "auto" else None
 
+    def find(small: NDArray[Any], smaller: float) -> Plane | None:
+        usable = None
+        if allowed is not None:
+            v, u = (np.arange(n) * of // n for n, of in zip(small.shape, allowed.shape, strict=True))
+            usable = allowed[v[:, None], u]
+        return road_plane(small, smaller, usable, request)
 
-def _road(
-    allowed: NDArray[np.bool_] | None, request: Request, small: NDArray[Any], smaller: float
-) -> Plane | None:
-    """Return the plane of the road that a smaller map shows in the region."""
-    if allowed is not None:
-        v, u = (np.arange(few) * many // few for few, many in zip(small.shape, allowed.shape, strict=True))
-        allowed = allowed[v[:, None], u]
-    return road_plane(small, smaller, allowed, request)
+    return find if request.road == "auto" else None
 
 
 _NUMERIC_ERRORS = (ArithmeticError, ValueError)  # from numbers that some step cannot deal with
 FRAME_ERRORS = (InputError, EstimationError, UsageError, OSError, MemoryError, cv2.error, *_NUMERIC_ERRORS)
-
-
-def guarded(frame: Frame, work: Callable[[], FrameResult]) -> FrameResult:
-    """Do the work; turn an error that costs only this frame into its `error` row."""
-    try:
-        with np.errstate(all="ignore"):  # numbers of damaged maps overflow: the row says what comes of them
-            return work()
-    except FRAME_ERRORS as error:
-        return frame_of_error(frame, error)
 
 
 def frame_of_error(frame: Frame, error: Exception) -> FrameResult:

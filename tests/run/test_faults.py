@@ -10,12 +10,14 @@ import subprocess
 import sys
 from functools import partial
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
 from rollcli.files.results import parse_rows
 from rollcli.run.frame import Frame
-from rollcli.run.read import guarded
+from rollcli.run.frame_task import run_frame
+from rollcli.run.options import FrameOptions
 from tests.run_cli import (
     ROOT,
     command,
@@ -265,11 +267,9 @@ def alive_in_group(group):
     return True
 
 
-def test_the_row_of_a_frame_without_memory_says_so():
-    def exhausted():
-        raise MemoryError
-
-    row = guarded(Frame("a.png", "", "a.png", "", "a.png", None), exhausted).row
+def test_the_row_of_a_frame_without_memory_says_so(monkeypatch):
+    monkeypatch.setattr("rollcli.run.frame_task.read_source", Mock(side_effect=MemoryError))
+    row = run_frame(Frame("a.png", "", "a.png", "", "a.png", None), FrameOptions()).row
     assert (row.status, row.message) == ("error", "out of memory")
 
 
