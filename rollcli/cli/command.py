@@ -16,7 +16,7 @@ import click
 from click.core import ParameterSource
 
 from rollcli.cli.types import FILE, FLAG, ParamType, Parsed
-from rollcli.errors import ExitStatus, InputError, cause_of
+from rollcli.errors import ExitStatus, UsageError, reading
 from rollcli.files.bounded import MOST_SETTINGS, as_utf8, read_given
 from rollcli.messages import say, show_tracebacks
 
@@ -379,17 +379,15 @@ def _load(path: str) -> dict[str, Any]:
     else:
         import tomli as tomllib
 
+    with reading(path):
+        data = as_utf8(read_given(path, MOST_SETTINGS), path)
     try:
-        text = as_utf8(read_given(path, MOST_SETTINGS), path).decode()
+        text = data.decode()
         if _MANY_PARTS.search(text):  # which takes time and memory that grow with the square of their number
-            raise click.UsageError(f"{path}: is no file of options: it has a key of more than {_PARTS} parts")
+            raise UsageError(f"{path}: is no file of options: it has a key of more than {_PARTS} parts")
         return tomllib.loads(text)
-    except OSError as error:
-        raise click.UsageError(f"{path}: cannot be read: {cause_of(error)}") from error
-    except InputError as error:
-        raise click.UsageError(str(error)) from error
     except (ValueError, RecursionError) as error:  # TOML, UTF-8, numbers of thousands of digits
-        raise click.UsageError(f"{path}: is not TOML: {error}") from error
+        raise UsageError(f"{path}: is not TOML: {error}") from error
 
 
 def _checked(ctx: click.Context, declared: click.Option, value: Any, path: str) -> Any:
