@@ -269,10 +269,6 @@ def run_rig(options: RigOptions) -> int:
     return status_of(checks)
 
 
-def _recorded(result: str) -> FrameOptions:
-    return recorded_options(results.read_run(result), results.run_path(result))
-
-
 _PAIRS = 24  # matched again, a few seconds: 8 of rendered roads tell a scale to 0.02 %, one to 0.1
 _FEWEST = 4
 
@@ -323,7 +319,7 @@ def _pairs(rig: RigAssessment, paths: Sequence[str]) -> Iterator[tuple[Frame, Fr
     origins = rig.frames.origins or [""] * rig.count
     names = {(origins[place], rig.frames.files[place]) for place in chosen}
     for path, run in zip(paths, runs, strict=True):
-        options = _recorded(path)
+        options = recorded_options(results.read_run(path), results.run_path(path))
         stereo = replace(options.stereo, align="auto", vertical_offset=None)
         options = options._replace(stereo=stereo, region=RegionOptions())
         with suppress(InputError):  # what came by a pipe is gone
