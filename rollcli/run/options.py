@@ -287,11 +287,6 @@ class ImageOptions(NamedTuple):
             if folder is not None
         )
 
-    @property
-    def needs_photo(self) -> bool:
-        """Whether something is drawn on the left image of a pair."""
-        return self.road_mask is not None or self.heights_preview is not None
-
 
 class RunningOptions(NamedTuple):
     """How the program runs and how much it says.
@@ -434,6 +429,8 @@ class FramesOptions:
     stereo: StereoOptions = field(default_factory=StereoOptions)
     region: RegionOptions = field(default_factory=RegionOptions)
     calibration: CalibrationOptions = field(default_factory=CalibrationOptions)
+    method: MethodOptions = field(default_factory=MethodOptions)
+    images: ImageOptions = field(default_factory=ImageOptions)
 
     @property
     def paired(self) -> bool:
@@ -443,7 +440,7 @@ class FramesOptions:
     @property
     def writes(self) -> tuple[Written, ...]:
         """The files that may be written for a frame."""
-        return ()
+        return self.images.writes(computed=self.paired)
 
     @property
     def folders(self) -> list[str]:
@@ -457,7 +454,9 @@ class FramesOptions:
             self.encoding,
             replace(self.stereo, align=self.stereo.correction or self.stereo.align),
             self.region,
-            side_by_side=self.pairs.side_by_side,
+            self.method,
+            self.images,
+            self.pairs.side_by_side,
             root=self.running.root,
             replaces=self.running.overwrite,
         )
@@ -468,19 +467,7 @@ class FramesOptions:
 class EstimateOptions(FramesOptions):
     """Every option of `rollcli estimate`."""
 
-    method: MethodOptions
-    images: ImageOptions
     result: ResultOptions
-
-    @property
-    def writes(self) -> tuple[Written, ...]:
-        """The images."""
-        return self.images.writes(computed=self.paired)
-
-    @property
-    def frame(self) -> FrameOptions:
-        """What decides the row and the images of a frame."""
-        return super().frame._replace(method=self.method, images=self.images)
 
 
 @dataclass(frozen=True, kw_only=True)

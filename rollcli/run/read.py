@@ -293,7 +293,8 @@ def _match(frame: Frame, options: FrameOptions) -> Source:
     source = matched_source(left, right, options.stereo, find_road)
     if not np.any(source.disparity):
         raise InputError(f"{frame.file}: no pixel could be matched with the right image")
-    return replace(source, photo=left if options.images.needs_photo else None, allowed=allowed)
+    drawn_on = options.images.road_mask is not None or options.images.heights_preview is not None
+    return replace(source, photo=left if drawn_on else None, allowed=allowed)
 
 
 def read_views(frame: Frame, options: FrameOptions) -> tuple[NDArray[Any], NDArray[Any]]:
