@@ -56,7 +56,7 @@ def _run(plan: Plan, resume_command: str) -> ExitStatus:
         whole = False
         try:
             with stop_on_signals() as stop, progress:
-                whole = _run_steps(plan, output, progress, stop)
+                whole = all(_run_step(step, plan, output, progress, stop) for step in kept.steps())
         except KeyboardInterrupt:  # the second Ctrl-C: without waiting for the frames that have begun
             pass
         except (OutputError, WorkerError) as error:
@@ -76,17 +76,6 @@ def _run(plan: Plan, resume_command: str) -> ExitStatus:
         return progress.summary.status
 
 
-def _run_steps(plan: Plan, output: Output, progress: Progress, stop: Stop) -> bool:
-    """Do one step after the other, up to one that does not come to its end; tell whether none is left."""
-    for step in output.kept.steps():
-        try:
-            if not _run_step(step, plan, output, progress, stop):
-                return False
-        finally:
-            output.commit()
-    return True
-
-
 def _run_step(step: Step, plan: Plan, output: Output, progress: Progress, stop: Stop) -> bool:
     """Do the frames of a step, images before rows, and rows in their order; tell whether all are done."""
     options, record, parts = plan.options, output.record, output.parts_of(step)
@@ -101,18 +90,21 @@ def _run_step(step: Step, plan: Plan, output: Output, progress: Progress, stop: 
     work = work_on(step.frames, told, join=join, tell=lambda: record.read_as, unit=unit)
     workers = workers_for(step.frames, options, [parts.output] if parts else [])
     done, following = 0, iter(step.frames)
-    with contextlib.closing(run_joined(step.frames, work, stop, workers)) as batches:
-        for batch in batches:
-            frames = list(islice(following, len(batch)))
-            positions = step.positions[done : done + len(batch)]
-            done += len(batch)
-            if not positions:
-                output.restore(frames, batch)
-                continue
-            record.saw(batch.read_as)  # before their rows are written
-            add = output.replace if step.retries else output.append
-            add(positions, frames, batch)
-            progress.add_rows([frame.file for frame in frames], batch.figures, positions, batch.told)
-            if options.result.fail_fast and batch.figures.first_error >= 0:
-                return False
+    try:
+        with contextlib.closing(run_joined(step.frames, work, stop, workers)) as batches:
+            for batch in batches:
+                frames = list(islice(following, len(batch)))
+                positions = step.positions[done : done + len(batch)]
+                done += len(batch)
+                if not positions:
+                    output.restore(frames, batch)
+                    continue
+                record.saw(batch.read_as)  # before their rows are written
+                add = output.replace if step.retries else output.append
+                add(positions, frames, batch)
+                progress.add_rows([frame.file for frame in frames], batch.figures, positions, batch.told)
+                if options.result.fail_fast and batch.figures.first_error >= 0:
+                    return False
+    finally:
+        output.commit()
     return done == len(step.frames)
