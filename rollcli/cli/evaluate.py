@@ -5,9 +5,9 @@ from dataclasses import replace
 import click
 
 from rollcli.cli import options as shared
-from rollcli.cli.command import Section, command, option
+from rollcli.cli.command import command, option
 from rollcli.cli.types import DIR, FILE, PATH, TABLE_FILE, TABLE_FORMATS, TURNS, Choice, Number, table_format
-from rollcli.evaluate.options import AccuracyOptions, ExperimentOptions, PaperOptions
+from rollcli.evaluate.options import AccuracyOptions, PaperOptions
 
 
 @command(AccuracyOptions, short_help="Errors of a result against known angles.")
@@ -33,18 +33,13 @@ def accuracy(options: AccuracyOptions) -> int:
     return run_accuracy(replace(options, format=table_format(options.format, options.output)))
 
 
-experiment_options = Section("experiments", "Experiments", ExperimentOptions).of(
-    option("-o, --output", DIR, required=True),
-    option("--turns", TURNS),
-    option("--timed", Number("N", at_least=1, whole=True)),
-    option("--truth", FILE),
-    option("--figure", Choice("svg", "pdf", "png")),
-)
-
-
 @command(PaperOptions, short_help="The paper's tables and figures on your maps.")
 @shared.input_options
-@experiment_options
+@option("-o, --output", DIR, required=True, section="Experiments")
+@option("--turns", TURNS, section="Experiments")
+@option("--timed", Number("N", at_least=1, whole=True), section="Experiments")
+@option("--truth", FILE, section="Experiments")
+@option("--figure", Choice("svg", "pdf", "png"), section="Experiments")
 @shared.encoding_options
 @shared.region_options
 @shared.running_options

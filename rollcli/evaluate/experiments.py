@@ -320,7 +320,7 @@ Examined = tuple[FrameResult, Findings | None]  # of a map; the result says why 
 
 def examine_file(frame: Frame, options: PaperOptions, truth: Mapping[str, KnownPose]) -> Examined:
     """Read a map and run the experiments on it; `truth` holds known angles by stem, or nothing."""
-    turns = [math.radians(turn) for turn in options.experiments.turns_deg]
+    turns = [math.radians(turn) for turn in options.turns_deg]
     try:
         source = read_source(frame, options.frame)
         known = truth.get(stem_of(frame.file))

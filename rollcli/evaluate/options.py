@@ -34,9 +34,9 @@ class AccuracyOptions:
     running: RunningOptions
 
 
-@dataclass(frozen=True)
-class ExperimentOptions:
-    """Where the figures go, and what is varied.
+@dataclass(frozen=True, kw_only=True)
+class PaperOptions(FramesOptions):
+    """Everything that `rollcli evaluate paper` was asked: which maps, where figures go, what is varied.
 
     Attributes
     ----------
@@ -64,17 +64,10 @@ class ExperimentOptions:
         first, last, step = self.turns
         return tuple(first + step * k for k in range(int((last - first) / step + 1e-9) + 1))
 
-
-@dataclass(frozen=True, kw_only=True)
-class PaperOptions(FramesOptions):
-    """Everything that `rollcli evaluate paper` was asked."""
-
-    experiments: ExperimentOptions
-
     @property
     def folders(self) -> list[str]:
         """Where the page and the tables go."""
-        return [self.experiments.output]
+        return [self.output]
 
     @property
     def has_region(self) -> bool:

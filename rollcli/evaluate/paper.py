@@ -50,25 +50,25 @@ def run_paper(options: PaperOptions) -> ExitStatus:
     require_extra("report", "the page of charts")
     if options.encoding.encoding == "depth":
         raise UsageError("--encoding depth: the experiments are made on disparity maps, not on depth maps")
-    frames, folder = find_frames(options), options.experiments.output
+    frames, folder = find_frames(options), options.output
     check_places(frames, options.folders)
     truth = _known_angles(frames, options)
-    kind = options.experiments.figure
+    kind = options.figure
     names = [f"{name}.{kind}" for name in FIGURES] if kind is not None else []
     writes = [within(folder, name) for name in (*(f"{name}.csv" for name in TABLES), *names, PAGE)]
-    reads = [*filter(None, [options.experiments.truth]), *(path for each in frames for path in each.reads())]
+    reads = [*filter(None, [options.truth]), *(path for each in frames for path in each.reads())]
     if listed_only(lambda: [(reads, writes)], options.running):
         return ExitStatus.DONE
     return _run(frames, truth, options)
 
 
 def _known_angles(frames: Sequence[Frame], options: PaperOptions) -> Mapping[str, KnownPose]:
-    if options.experiments.truth is None:
+    if options.truth is None:
         return {}
-    truth = read_truth(options.experiments.truth)
+    truth = read_truth(options.truth)
     for frame in frames:
         if stem_of(frame.file) not in truth:
-            raise UsageError(f"{frame.file}: has no known angle in {options.experiments.truth}")
+            raise UsageError(f"{frame.file}: has no known angle in {options.truth}")
     return truth
 
 
@@ -94,13 +94,13 @@ def _run(frames: Sequence[Frame], truth: Mapping[str, KnownPose], options: Paper
         progress.say("no map gave an angle: there is nothing to tabulate")
         return progress.summary.status
     good = [frame for frame, (_, findings) in zip(frames, examined, strict=True) if findings is not None]
-    chosen = good[: options.experiments.timed]
+    chosen = good[: options.timed]
     progress.note(f"run times, on {len(chosen)} of the maps")
     # in this process alone
     times = [time_file(frame, options) for frame in chosen]
     for name, data in paper_files(found, failed, times, options).items():
-        write_output(within(options.experiments.output, name), data, overwrite=options.running.overwrite)
-    progress.note(f"{within(options.experiments.output, PAGE)} and {len(TABLES)} tables are written")
+        write_output(within(options.output, name), data, overwrite=options.running.overwrite)
+    progress.note(f"{within(options.output, PAGE)} and {len(TABLES)} tables are written")
     return progress.summary.status
 
 
@@ -140,10 +140,10 @@ def paper_files(
         found=found,
         failed=failed,
         times=times,
-        options=options.experiments,
+        options=options,
         region=options.has_region,
     )
-    kind = options.experiments.figure
+    kind = options.figure
     printed = {} if kind is None else figures
     return {
         **{f"{name}.csv": table_csv(table) for name, table in tables.items()},

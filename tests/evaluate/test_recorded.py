@@ -26,7 +26,7 @@ from rollcli.evaluate.experiments import (
     examine,
     rotate_nearest,
 )
-from rollcli.evaluate.options import ExperimentOptions, PaperOptions
+from rollcli.evaluate.options import PaperOptions
 from rollcli.evaluate.paper import PAGE, paper_files
 from rollcli.evaluate.paper_tables import all_tables, table_csv
 from rollcli.evaluate.truth import KnownPose, read_truth
@@ -133,18 +133,17 @@ def _figures(tables):
     return module.paper_figures(tables)
 
 
+_asked = partial(PaperOptions, inputs=InputOptions(("maps",)), running=RunningOptions(), output="out")
+
+
 def _page(count=1, seconds=(1.0,), region=None, **experiments):
     """What the page of these maps says."""
     pytest.importorskip("plotly", reason="plotly, of the extra report, is not here")
     pytest.importorskip("jinja2", reason="jinja2, of the extra report, is not here")
     found, timed = [_map_of(f"map{place}.png") for place in range(count)], [_times(each) for each in seconds]
-    options = PaperOptions(
-        inputs=InputOptions(("maps",)),
-        region=region or RegionOptions(),
-        experiments=ExperimentOptions("out", **experiments),
-        running=RunningOptions(),
-    )
-    page = paper_files(found, [], timed, options)[PAGE].decode()
+    page = paper_files(found, [], timed, _asked(region=region or RegionOptions(), **experiments))[
+        PAGE
+    ].decode()
     page = page.replace(f"rollcli {__version__}", "rollcli")
     shown = re.sub(r"<(script|style|svg).*?</\1>", "", page, flags=re.S)
     return " ".join(html.unescape(re.sub("<[^>]+>", "", shown)).split())
@@ -190,7 +189,7 @@ CASES = {
     "turned": lambda: [
         rotate_nearest(np.arange(1.0, 71).reshape(7, 10), turn) for turn in (*TURNS, 0.0, math.pi / 2)
     ],
-    "angles": lambda: [ExperimentOptions("out", turns).turns_deg for turns in ANGLES],
+    "angles": lambda: [_asked(turns=turns).turns_deg for turns in ANGLES],
     "tables without angles": _tables_without_angles,
     "page": _page,
     "page of two": partial(_page, 2, (2e-6, 3e-6)),
