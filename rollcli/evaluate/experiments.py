@@ -322,7 +322,7 @@ def examine_file(frame: Frame, options: PaperOptions, truth: Mapping[str, KnownP
     """Read a map and run the experiments on it; `truth` holds known angles by stem, or nothing."""
     turns = [math.radians(turn) for turn in options.turns_deg]
     try:
-        source = read_source(frame, options.frame)
+        source = read_source(frame, options)
         known = truth.get(stem_of(frame.file))
         theta = None if known is None else known.theta
         findings = examine(frame.file, _usable_pixels(source), turns, theta, chosen=options.has_region)
@@ -333,7 +333,7 @@ def examine_file(frame: Frame, options: PaperOptions, truth: Mapping[str, KnownP
 
 def time_file(frame: Frame, options: PaperOptions) -> Times:
     """Read a map and time the solvers on it."""
-    return time_solvers(_usable_pixels(read_source(frame, options.frame)))
+    return time_solvers(_usable_pixels(read_source(frame, options)))
 
 
 def _usable_pixels(source: Source) -> NDArray[Any]:

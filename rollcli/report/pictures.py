@@ -18,7 +18,7 @@ from rollcli.pictures.heights import CAMERA_HEIGHTS, METRES, FittedRoad, heights
 from rollcli.pictures.overlay import draw_disparity, draw_heights, draw_road
 from rollcli.pictures.vdisparity import draw_v_disparity, row_offset, v_disparity
 from rollcli.report.sources import Subject
-from rollcli.run.options import EncodingOptions, FrameOptions
+from rollcli.run.options import EncodingOptions, FramesOptions
 from rollcli.run.read import FRAME_ERRORS, Source, read_source
 
 # small enough that a page with a dozen frames opens at once, large enough to see a stripe of noise
@@ -90,7 +90,7 @@ def _attempt(make: Callable[[], Made]) -> tuple[Made | None, str]:
 def _source(subject: Subject) -> Source:
     options = subject.options
     if "disparity" in subject.images:
-        source = _read(subject, FrameOptions(), "disparity")
+        source = _read(subject, FramesOptions(), "disparity")
         if source.size is not None:
             return source
         height, width = source.disparity.shape
@@ -99,10 +99,10 @@ def _source(subject: Subject) -> Source:
     if subject.refused:
         raise InputError(subject.refused)
     # a pair's left image is kept where the road is to be drawn on it
-    return _read(subject, options._replace(images=options.images._replace(road_mask="")))
+    return _read(subject, replace(options, images=options.images._replace(road_mask="")))
 
 
-def _read(subject: Subject, options: FrameOptions, kind: str = "") -> Source:
+def _read(subject: Subject, options: FramesOptions, kind: str = "") -> Source:
     """Read a map or match a pair; `kind`: read this image of it, a map."""
     frame = subject.frame
     if kind:
@@ -130,7 +130,7 @@ def _level(subject: Subject, disparity: NDArray[Any] | None) -> NDArray[Any] | N
     """Return the map de-rotated: as `estimate` wrote it, else made."""
     if "derotated" in subject.images:
         given = EncodingOptions() if subject.frame.right_file else subject.options.encoding
-        return _read(subject, FrameOptions(given), "derotated").disparity
+        return _read(subject, FramesOptions(encoding=given), "derotated").disparity
     return None if disparity is None else derotate(disparity, subject.theta)
 
 

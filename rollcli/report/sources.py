@@ -15,7 +15,7 @@ from rollcli.files.search import MAP_ENDINGS, objects_behind
 from rollcli.files.stores.locations import base_name, is_remote, is_url, store_of
 from rollcli.rig.calibration import Calibration
 from rollcli.run.frame import Frame, frame_of_row
-from rollcli.run.options import KINDS, FrameOptions, ImageKind, ImageOptions
+from rollcli.run.options import KINDS, FramesOptions, ImageKind, ImageOptions
 from rollcli.simulate.options import TRUTH
 
 JUMP, WIDEST, SUSPECT, SPREAD = "around a jump", "widest interval", "suspect", "evenly spread"
@@ -75,7 +75,7 @@ class Subject:
         The files that `estimate` wrote for it, by kind.
     row : Row
         What the result says of it.
-    options : FrameOptions
+    options : FramesOptions
         How its result was made.
     refused : str
         Why the inputs are not read; empty where they may be.
@@ -84,7 +84,7 @@ class Subject:
     frame: Frame
     images: dict[str, str]
     row: Row
-    options: FrameOptions
+    options: FramesOptions
     refused: str = ""
 
     @property
@@ -97,7 +97,7 @@ def subjects(
     rows: Sequence[Row],
     result: str,
     images: str | None,
-    options: FrameOptions,
+    options: FramesOptions,
     calibration: Calibration | None = None,
     *,
     fetch: bool = False,
@@ -111,7 +111,7 @@ def subjects(
         The result's path: names that do not exist from here are looked for beside it.
     images : str or None
         The folder of images, or of folders of images, that `estimate` wrote.
-    options : FrameOptions
+    options : FramesOptions
         How the result was made, and which folders the run wrote images to.
     calibration : Calibration or None
         Of all rows.

@@ -27,21 +27,21 @@ from rollcli.files.storage import create, write_bytes
 from rollcli.files.stores.locations import is_url, public_name, tasks_in_hand
 from rollcli.files.stores.objects import object_owner
 from rollcli.run.frame import Frame, FrameResult, ReadAs, failed_frame
-from rollcli.run.options import FrameOptions, FramesOptions, ResultOptions
+from rollcli.run.options import EstimateOptions, FramesOptions
 from rollcli.run.outputs import files_of, local_files, write_outputs
 from rollcli.run.progress import Figures
 from rollcli.run.result_file import inputs_line, part_inputs_path
 from rollcli.run.workers.chunks import Span, Work, Workers
 
 
-def do_frame(frame: Frame, options: FrameOptions) -> FrameResult:
+def do_frame(frame: Frame, options: FramesOptions) -> FrameResult:
     """Do the work on a frame, on a worker."""
     from rollcli.run.frame_task import run_frame
 
     return run_frame(frame, options)
 
 
-def work_on(frames: Iterable[Frame], options: FrameOptions, **further: Any) -> Work[Frame, FrameResult]:
+def work_on(frames: Iterable[Frame], options: FramesOptions, **further: Any) -> Work[Frame, FrameResult]:
     """Say what is done with frames; `further` are fields of `Work`."""
 
     def lost(frame: Frame, reason: str) -> FrameResult:
@@ -102,63 +102,6 @@ class Batch:
         return len(self.figures.status)
 
 
-class Parts(NamedTuple):
-    """Where the rows of a step go that are written in parts.
-
-    Attributes
-    ----------
-    output : str
-        The folder, for workers.
-    form : str
-    further : tuple of str
-        Columns beside those of every result.
-    rows : int
-        Of each part but the last one of a result.
-    numbers : sequence of int
-        The parts of the step, in order.
-    frames : int
-        How many frames the step has.
-    run : str
-        The run's own name, which objects carry.
-    of_rows : mapping
-        What Parquet's metadata say of them.
-    """
-
-    output: str
-    form: Format
-    further: tuple[str, ...]
-    rows: int
-    numbers: Sequence[int]
-    frames: int
-    run: str
-    of_rows: Mapping[str, Any]
-
-    def write(self, number: int, lines: Sequence[bytes], notes: Sequence[bytes]) -> None:
-        """Write what a part was made from, then the part, whole, unless there is one.
-
-        Raises
-        ------
-        UsageError
-            Another run has written it, or has begun to write this result.
-        OutputError
-            It cannot be written.
-        """
-        location, inputs = part_paths(self.output, self.form, number)
-        check_owned(self.output, self.run)
-        write_bytes(inputs, b"".join(notes), durable=True)
-        if not create(location, self.encoded(number, lines), self.run):
-            raise UsageError(
-                f"{location}: another run has written this part; give each an --output of its own"
-            )
-
-    def encoded(self, number: int, lines: Sequence[bytes]) -> bytes:
-        """Make the bytes of a part of its lines."""
-        if self.form == "parquet":
-            return encode_parquet(column_types(self.further), list(map(json.loads, lines)), self.of_rows)
-        header = format_header(self.form, self.further) if number == 0 else b""
-        return header + b"".join(lines)
-
-
 class Step(NamedTuple):
     """Frames that workers do in one go.
 
@@ -199,26 +142,56 @@ def check_owned(output: str, run: str) -> None:
 
 
 class BatchOptions(NamedTuple):
-    """What a worker is told of the rows that it makes.
+    """What a worker is told of the rows that it makes, and how parts of a result are written of them.
 
     Attributes
     ----------
-    result : ResultOptions
+    told : EstimateOptions
+        What it is told of the frames, and how rows are written.
     further : tuple of str
         Columns beside those of every result.
-    frame : FrameOptions
-        What it is told of the frames.
-    verbose : bool
-        Whether the user is told of every frame.
-    parts : Parts or None
-        Where whole parts go; None: all rows come back.
+    output : str
+        The folder of the parts that it writes; empty: all rows come back.
+    numbers : sequence of int
+        The parts of the step, in order.
+    frames : int
+        How many frames the step has.
+    of_rows : mapping
+        What Parquet's metadata say of the rows.
     """
 
-    result: ResultOptions
-    further: tuple[str, ...]
-    frame: FrameOptions
-    verbose: bool = False
-    parts: Parts | None = None
+    told: EstimateOptions
+    further: tuple[str, ...] = ()
+    output: str = ""
+    numbers: Sequence[int] = ()
+    frames: int = 0
+    of_rows: Mapping[str, Any] = {}
+
+    def write(self, number: int, lines: Sequence[bytes], notes: Sequence[bytes]) -> None:
+        """Write what a part was made from, then the part, whole, unless there is one.
+
+        Raises
+        ------
+        UsageError
+            Another run has written it, or has begun to write this result.
+        OutputError
+            It cannot be written.
+        """
+        location, inputs = part_paths(self.output, self.told.result.form, number)
+        check_owned(self.output, self.told.run)
+        write_bytes(inputs, b"".join(notes), durable=True)
+        if not create(location, self.encoded(number, lines), self.told.run):
+            raise UsageError(
+                f"{location}: another run has written this part; give each an --output of its own"
+            )
+
+    def encoded(self, number: int, lines: Sequence[bytes]) -> bytes:
+        """Make the bytes of a part of its lines."""
+        form = self.told.result.form
+        if form == "parquet":
+            return encode_parquet(column_types(self.further), list(map(json.loads, lines)), self.of_rows)
+        header = format_header(form, self.further) if number == 0 else b""
+        return header + b"".join(lines)
 
 
 def join_results(frames: Span[Frame], results: Sequence[FrameResult], options: BatchOptions) -> Batch:
@@ -233,7 +206,7 @@ def join_results(frames: Span[Frame], results: Sequence[FrameResult], options: B
         A part cannot be written.
     """
     figures = Figures.of([result.row for result in results])
-    ends = options.result.fail_fast and figures.first_error >= 0
+    ends = options.told.result.fail_fast and figures.first_error >= 0
     if ends:
         results = results[: figures.first_error + 1]
         figures = Figures.of([result.row for result in results])
@@ -242,14 +215,14 @@ def join_results(frames: Span[Frame], results: Sequence[FrameResult], options: B
     for encoding, searched, downscale in kinds:
         read_as = read_as.joined(ReadAs(frozenset(filter(None, [encoding])), searched, downscale))
     # those of Parquet are JSON until a part is full
-    lines = [format_row(result.row, options.result.form, options.further) for result in results]
+    lines = [format_row(result.row, options.told.result.form, options.further) for result in results]
     known: ReadAs = frames.told
-    made = zip(frames, results, strict=False) if options.frame.notes else ()
+    made = zip(frames, results, strict=False) if options.told.notes else ()
     notes = [result.inputs or inputs_line(frame, {}) for frame, result in made]
     in_parts = 0
-    if options.parts is not None and not ends and known.joined(read_as) == known:
+    if options.output and not ends and known.joined(read_as) == known:
         in_parts = _write_parts(frames, figures.status, lines, notes, options)
-    told = list(results) if options.verbose else list(_told(results))
+    told = list(results) if options.told.running.verbose else list(_told(results))
     return Batch(figures, in_parts, lines[in_parts:], notes[in_parts:], read_as, told)
 
 
@@ -257,14 +230,14 @@ def _write_parts(
     frames: Span[Frame], status: bytes, lines: Sequence[bytes], notes: Sequence[bytes], options: BatchOptions
 ) -> int:
     """Write the parts that the lines fill, if they begin with one; return how many lines that were."""
-    parts, written, writes = options.parts, 0, options.frame.writes
-    while parts and frames.first % parts.rows == 0 and written < len(lines):
+    part_rows, writes, written = options.told.result.part_rows, options.told.writes, 0
+    while frames.first % part_rows == 0 and written < len(lines):
         first = frames.first + written
-        end = written + min(parts.rows, parts.frames - first)
+        end = written + min(part_rows, options.frames - first)
         if end > len(lines):
             break
         sync_files(local_files(frames[written:end], status[written:end], writes))
-        parts.write(parts.numbers[first // parts.rows], lines[written:end], notes[written:end])
+        options.write(options.numbers[first // part_rows], lines[written:end], notes[written:end])
         written = end
     return written
 

@@ -21,7 +21,7 @@ from rollcli.run.frame import Frame, located_beside
 from rollcli.run.options import (
     ConvertOptions,
     DerotateOptions,
-    FrameOptions,
+    FramesOptions,
     HeightsOptions,
     VDisparityOptions,
 )
@@ -50,7 +50,7 @@ def run_conversion(options: ConvertOptions) -> ExitStatus:
         return ExitStatus.DONE
     require_scheduler(running.scheduler)
     progress = Progress(len(frames), options, statuses=("ok",))
-    work, workers = work_on(frames, options.frame), workers_for(frames, options)
+    work, workers = work_on(frames, options.told), workers_for(frames, options)
     work.clear(frames)
     with stop_on_signals() as stop, progress, closing(run_tasks(frames, work, stop, workers)) as results:
         for result in results:
@@ -156,7 +156,7 @@ def _rows_of(frames: Sequence[Frame], result: str, options: ConvertOptions) -> l
     return matched
 
 
-def _masks_of(recorded: FrameOptions, result: str) -> Callable[[str], str | None]:
+def _masks_of(recorded: FramesOptions, result: str) -> Callable[[str], str | None]:
     """Find the masks of a result's run, without which its maps have other angles."""
     mask = recorded.region.mask
     try:
@@ -165,7 +165,7 @@ def _masks_of(recorded: FrameOptions, result: str) -> Callable[[str], str | None
         raise UsageError(f"{result}: its maps are known by the mask that they had: {error}") from error
 
 
-def _is_copy(frame: Frame, row: Row, options: FrameOptions) -> bool:
+def _is_copy(frame: Frame, row: Row, options: FramesOptions) -> bool:
     """Tell whether a map gives the angle of a row."""
     from rollcli.estimator.estimate import estimate_roll
     from rollcli.run.read import read_source

@@ -20,7 +20,7 @@ from rollcli.estimator.estimate import RollEstimate, estimate_roll
 from rollcli.estimator.request import DEFAULT_REQUEST, Request
 from rollcli.files.encodings import Encoding
 from rollcli.files.formats import Stored
-from rollcli.run.options import FrameOptions
+from rollcli.run.options import FramesOptions
 
 _DIVISORS = (("sgbm", 16), ("kitti", 256))
 # what to do about what is no map in pixels: at the command line, and in Python
@@ -140,7 +140,7 @@ def too_large(disparity: NDArray[Any], stored: Stored, encoding: str, *, python:
 
 
 def looks_like(
-    disparity: NDArray[Any], stored: Stored | None, options: FrameOptions, *, python: bool = False
+    disparity: NDArray[Any], stored: Stored | None, options: FramesOptions, *, python: bool = False
 ) -> str:
     """Say what a map without a sure angle looks like instead; empty when it looks like nothing known.
 
@@ -150,7 +150,7 @@ def looks_like(
         Pixels; 0 is no data.
     stored : Stored or None
         What the file holds; None for a map that was matched from a pair.
-    options : FrameOptions
+    options : FramesOptions
     python : bool
         Whether the words are for a caller in Python.
     """
@@ -225,7 +225,7 @@ def _grows_downward(disparity: NDArray[Any]) -> bool:
     return bool(np.corrcoef(medians.T)[0, 1] > TUNING.downward)
 
 
-def _has_road(disparity: NDArray[Any], options: FrameOptions) -> bool:
+def _has_road(disparity: NDArray[Any], options: FramesOptions) -> bool:
     """Tell whether a road is found that gives no reason for doubt, however uncertain its angle is."""
     request = Request(max_interval=TUNING.wide, seed=options.method.seed, tuning=_ANY_ANGLE)
     return sure_estimate(disparity, request) is not None

@@ -2,12 +2,13 @@
 
 import contextlib
 import os
+from dataclasses import replace
 from functools import partial
 from itertools import chain, islice
 
 from rollcli.errors import ExitStatus, OutputError, WorkerError
 from rollcli.files.stores.locations import is_url
-from rollcli.run.batch import BatchOptions, Step, join_results, work_on, workers_for
+from rollcli.run.batch import Step, join_results, work_on, workers_for
 from rollcli.run.find import calibration_files, calibration_notes
 from rollcli.run.options import EstimateOptions
 from rollcli.run.outputs import every_path, list_files
@@ -78,17 +79,17 @@ def _run(plan: Plan, resume_command: str) -> ExitStatus:
 
 def _run_step(step: Step, plan: Plan, output: Output, progress: Progress, stop: Stop) -> bool:
     """Do the frames of a step, images before rows, and rows in their order; tell whether all are done."""
-    options, record, parts = plan.options, output.record, output.parts_of(step)
+    options, record = plan.options, output.record
     # whichever folder it is resumed from
     result = plan.output if is_url(plan.output) else os.path.realpath(plan.output)
     retry_of = result if step.retries else ""
-    told = options.frame._replace(
-        replaces=record.replaces, retry_of=retry_of, run=record.run, notes=bool(plan.files)
+    told = replace(
+        options.told, replaces=record.replaces, retry_of=retry_of, run=record.run, notes=bool(plan.files)
     )
-    rows = BatchOptions(options.result, plan.further, told, options.running.verbose, parts)
-    join, unit = partial(join_results, options=rows), parts.rows if parts else 1
+    rows = output.rows_of(step, told)
+    join, unit = partial(join_results, options=rows), options.result.part_rows if rows.output else 1
     work = work_on(step.frames, told, join=join, tell=lambda: record.read_as, unit=unit)
-    workers = workers_for(step.frames, options, [parts.output] if parts else [])
+    workers = workers_for(step.frames, options, filter(None, [rows.output]))
     done, following = 0, iter(step.frames)
     try:
         with contextlib.closing(run_joined(step.frames, work, stop, workers)) as batches:

@@ -190,10 +190,10 @@ def check_first_size(frames: Sequence[Frame], options: FramesOptions) -> Calibra
         with contextlib.suppress(InputError):  # its row will say so
             matched: tuple[int, ...]
             if first.right_file:
-                height, width = read_views(first, options.frame)[0].shape[:2]
+                height, width = read_views(first, options)[0].shape[:2]
                 matched = matched_shape((height, width), options.stereo.downscale)
             else:
-                stored = read_map(first, options.frame)
+                stored = read_map(first, options)
                 matched, (width, height) = stored.values.shape, size_of_images(stored)
             break
     else:

@@ -26,10 +26,11 @@ from rollcli.rig.pose import horizon_row, with_pose
 from rollcli.run.diagnosis import estimate_or_liken, looks_like, sure_estimate
 from rollcli.run.frame import Frame, FrameResult
 from rollcli.run.options import (
+    ConvertOptions,
     DerotateOptions,
     DisparityOptions,
     EncodingOptions,
-    FrameOptions,
+    FramesOptions,
     HeightsOptions,
     VDisparityOptions,
 )
@@ -43,7 +44,7 @@ _Files = tuple[dict[str, bytes], dict[str, str]]  # files by path, and warnings 
 _Made = tuple[Row, dict[str, bytes], dict[str, str]]  # the same behind the row
 
 
-def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
+def run_frame(frame: Frame, options: FramesOptions) -> FrameResult:
     """Read a frame, make its row and write its files; what is wrong with it becomes an `error` row.
 
     Raises
@@ -65,19 +66,19 @@ def run_frame(frame: Frame, options: FrameOptions) -> FrameResult:
     return replace(result, row=replace(result.row, elapsed_ms=elapsed), inputs=inputs)
 
 
-def _done(frame: Frame, options: FrameOptions) -> tuple[FrameResult, dict[str, bytes]]:
+def _done(frame: Frame, options: FramesOptions) -> tuple[FrameResult, dict[str, bytes]]:
     """Read a frame; return its row, and its files by path."""
     # of the result that a conversion is given
-    if options.convert is not None and frame.row is not None and frame.row.map_roll_deg is None:
-        raise InputError(f"{frame.file}: has no angle in {options.convert.result}")
+    if isinstance(options, ConvertOptions) and frame.row is not None and frame.row.map_roll_deg is None:
+        raise InputError(f"{frame.file}: has no angle in {options.result}")
     source = read_source(frame, options)
-    make = _estimated if options.convert is None else _converted
+    make = _converted if isinstance(options, ConvertOptions) else _estimated
     row, files, warnings = make(frame, source, options)
     downscale = 1.0 if source.size is None else source.size[0] / source.disparity.shape[1]
     return FrameResult(row, source.encoding, warnings, source.searched, downscale), files
 
 
-def _estimated(frame: Frame, source: Source, options: FrameOptions) -> _Made:
+def _estimated(frame: Frame, source: Source, options: FramesOptions) -> _Made:
     calibration = source.calibrated(frame.calibration)
     request = options.method.request(source.slope_error, calibration)
     like = partial(looks_like, source.disparity, source.stored, options)
@@ -102,14 +103,14 @@ class Pictured:
     source : Source
     estimate : RollEstimate
         In the pixels of the map: its roll is not the rig's where fx and fy differ.
-    options : FrameOptions
+    options : FramesOptions
     calibration : Calibration or None
         Of the map.
     """
 
     source: Source
     estimate: RollEstimate
-    options: FrameOptions
+    options: FramesOptions
     calibration: Calibration | None = None
 
     def derotated(self, path: str) -> _Named:
@@ -167,7 +168,7 @@ def _encode_images(frame: Frame, pictured: Pictured) -> tuple[dict[str, bytes], 
     return images, note
 
 
-def _usual_paths(frame: Frame, options: FrameOptions) -> dict[str, str]:
+def _usual_paths(frame: Frame, options: FramesOptions) -> dict[str, str]:
     """Name the files of a frame, by their kinds."""
     return {kind: usual for kind, (usual, *_) in possible_paths(frame, options.writes)}
 
@@ -208,10 +209,10 @@ def encode_heights(heights: NDArray[np.float32], save_as: str, unit: str) -> byt
     return encode_stored(heights, form, text=f"height over the road, {unit}")
 
 
-def _converted(frame: Frame, source: Source, options: FrameOptions) -> _Made:
+def _converted(frame: Frame, source: Source, options: FramesOptions) -> _Made:
     """Make the files that a conversion makes of a frame."""
-    make = _MAKERS[type(options.convert)]
-    files, warnings = make(source, frame, options.convert, _usual_paths(frame, options))
+    make = _MAKERS[type(options)]
+    files, warnings = make(source, frame, options, _usual_paths(frame, options))
     row = Row(frame.file, frame.right_file, "ok", **source.alignment)
     return row, files, {**source.doubts, **warnings}
 
@@ -254,7 +255,7 @@ def _counted(source: Source, of: Frame, options: VDisparityOptions, paths: Mappi
     estimate = sure_estimate(source.disparity)
     curve, horizon, likeness = None, None, ""
     if estimate is None:
-        likeness = looks_like(source.disparity, source.stored, options.frame)
+        likeness = looks_like(source.disparity, source.stored, options)
     else:
         curve = profile(estimate.alpha, estimate.theta, estimate.width)
         if (calibration := source.calibrated(of.calibration)) is not None:

@@ -24,7 +24,7 @@ from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import with_pose
 from rollcli.run.diagnosis import REMEDIES, estimate_or_liken, looks_like, too_large
 from rollcli.run.find import given_calibration
-from rollcli.run.options import FrameOptions, MethodOptions
+from rollcli.run.options import FramesOptions, MethodOptions
 from rollcli.run.read import Source, matched_source, road_finder
 from rollcli.stereo.options import StereoOptions
 
@@ -139,7 +139,7 @@ def _likeness(values: NDArray[Any], seed: int) -> str:
     """Say what an array without a sure angle looks like instead of a map; empty when like nothing known."""
     if values.dtype.kind not in "fiu" or not values.size:
         return ""
-    return looks_like(*_in_pixels(values), FrameOptions(method=MethodOptions(seed=seed)), python=True)
+    return looks_like(*_in_pixels(values), FramesOptions(method=MethodOptions(seed=seed)), python=True)
 
 
 def estimate_pair(

@@ -7,7 +7,7 @@ import math
 import posixpath
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeVar
 
 from rollcli.estimator.request import (
     LAMBDA0,
@@ -325,37 +325,6 @@ class RunningOptions(NamedTuple):
             say(*dict.fromkeys(messages))
 
 
-class FrameOptions(NamedTuple):
-    """What decides the row and the files of a frame: everything that a worker is told beside the frame.
-
-    `writes` are its files, as a worker locates them. `root` is the folder where relative paths start, for
-    workers on other machines; empty for this one. `replaces` tells whether files that are in the place of an
-    image are replaced. `retry_of` names the result whose failed frames are done again; empty otherwise.
-    `run` names the run: what no worker sees changing, an object, is read anew by each. `notes` tells whether
-    workers say what each frame was read from. `convert` is the conversion that makes the files, if one does.
-    """
-
-    encoding: EncodingOptions = EncodingOptions()
-    stereo: StereoOptions = StereoOptions()
-    region: RegionOptions = RegionOptions()
-    method: MethodOptions = MethodOptions()
-    images: ImageOptions = ImageOptions()
-    side_by_side: Layout | None = None
-    writes: tuple[Written, ...] = ()
-    root: str = ""
-    replaces: bool = False
-    retry_of: str = ""
-    run: str = ""
-    notes: bool = False
-    convert: "ConvertOptions | None" = None
-
-    def at(self, path: str) -> str:
-        """Locate a path on this worker."""
-        from rollcli.files.stores.locations import located
-
-        return located(self.root, path)
-
-
 Form = Literal["csv", "jsonl", "parquet"]
 _FORM_OF_ENDING: dict[str, Form] = {".jsonl": "jsonl", ".ndjson": "jsonl", ".parquet": "parquet"}
 
@@ -417,12 +386,21 @@ class ResultOptions(NamedTuple):
         return self.form == "parquet" or is_url(self.output)
 
 
+Told = TypeVar("Told", bound="FramesOptions")
+
+
 @dataclass(frozen=True, kw_only=True)
 class FramesOptions:
-    """What every command is told that goes through frames."""
+    """What every command is told that goes through frames, and what it tells its workers of them: see `told`.
 
-    inputs: InputOptions
-    running: RunningOptions
+    `root` is the folder where relative paths start, for workers on other machines; empty for this one.
+    `replaces` tells whether files that are in the place of an image are replaced. `retry_of` names the result
+    whose failed frames are done again; empty otherwise. `run` names the run: what no worker sees changing, an
+    object, is read anew by each. `notes` tells whether workers say what each frame was read from.
+    """
+
+    inputs: InputOptions = field(default_factory=InputOptions)
+    running: RunningOptions = field(default_factory=RunningOptions)
     pairs: PairOptions = field(default_factory=PairOptions)
     topics: TopicOptions = field(default_factory=TopicOptions)
     encoding: EncodingOptions = field(default_factory=EncodingOptions)
@@ -431,6 +409,11 @@ class FramesOptions:
     calibration: CalibrationOptions = field(default_factory=CalibrationOptions)
     method: MethodOptions = field(default_factory=MethodOptions)
     images: ImageOptions = field(default_factory=ImageOptions)
+    root: str = ""
+    replaces: bool = False
+    retry_of: str = ""
+    run: str = ""
+    notes: bool = False
 
     @property
     def paired(self) -> bool:
@@ -438,36 +421,39 @@ class FramesOptions:
         return any((*self.pairs[:2], self.pairs.side_by_side, *self.topics[:2]))
 
     @property
-    def writes(self) -> tuple[Written, ...]:
-        """The files that may be written for a frame."""
+    def files(self) -> tuple[Written, ...]:
+        """The files that may be written for a frame, as the user names their folders."""
         return self.images.writes(computed=self.paired)
+
+    @property
+    def writes(self) -> tuple[Written, ...]:
+        """The same, as a worker locates their folders."""
+        return tuple(each._replace(folder=self.at(each.folder)) for each in self.files)
 
     @property
     def folders(self) -> list[str]:
         """Where files are written: no inputs are searched there."""
-        return list(dict.fromkeys(each.folder for each in self.writes))
+        return list(dict.fromkeys(each.folder for each in self.files))
 
     @property
-    def frame(self) -> FrameOptions:
-        """What a worker is told of the frames."""
-        told = FrameOptions(
-            self.encoding,
-            replace(self.stereo, align=self.stereo.correction or self.stereo.align),
-            self.region,
-            self.method,
-            self.images,
-            self.pairs.side_by_side,
-            root=self.running.root,
-            replaces=self.running.overwrite,
-        )
-        return told._replace(writes=tuple(each._replace(folder=told.at(each.folder)) for each in self.writes))
+    def told(self: "Told") -> "Told":
+        """What workers are told; of many inputs each gets its own alone."""
+        stereo = replace(self.stereo, align=self.stereo.correction or self.stereo.align)
+        root, replaces = self.running.root, self.running.overwrite
+        return replace(self, inputs=InputOptions(), stereo=stereo, root=root, replaces=replaces)
+
+    def at(self, path: str) -> str:
+        """Locate a path on this worker."""
+        from rollcli.files.stores.locations import located
+
+        return located(self.root, path)
 
 
 @dataclass(frozen=True, kw_only=True)
 class EstimateOptions(FramesOptions):
     """Every option of `rollcli estimate`."""
 
-    result: ResultOptions
+    result: ResultOptions = field(default_factory=ResultOptions)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -487,11 +473,6 @@ class ConvertOptions(FramesOptions):
     output: str
     result: str | None = None
     skip_suspect: bool = False
-
-    @property
-    def frame(self) -> FrameOptions:
-        """How a frame is read, and its files are made."""
-        return super().frame._replace(convert=replace(self, inputs=InputOptions()))  # which may be long
 
 
 def _picture(preview: str | None) -> list[Written]:
@@ -522,7 +503,7 @@ class DerotateOptions(ConvertOptions):
     save_matrix: bool = False
 
     @property
-    def writes(self) -> tuple[Written, ...]:
+    def files(self) -> tuple[Written, ...]:
         """The map, and its matrix."""
         matrix = [Written("matrix", self.output, (".txt",))] if self.save_matrix else []
         return Written("derotated", self.output, (None,)), *matrix
@@ -552,7 +533,7 @@ class HeightsOptions(ConvertOptions):
     save_as: Literal["tiff", "npy"] = "tiff"
 
     @property
-    def writes(self) -> tuple[Written, ...]:
+    def files(self) -> tuple[Written, ...]:
         """The heights, and their picture."""
         heights = Written("heights", self.output, (ENDING_OF_FORMAT[self.save_as],))
         return heights, *_picture(self.preview)
@@ -586,7 +567,7 @@ class VDisparityOptions(ConvertOptions):
     figure: str | None = None
 
     @property
-    def writes(self) -> tuple[Written, ...]:
+    def files(self) -> tuple[Written, ...]:
         """The figure or the picture, and the counts."""
         counts = [Written("counts", self.output, (".tif",))] if self.counts else []
         return Written("vdisparity", self.output, (f".{self.figure or 'png'}",)), *counts
@@ -614,7 +595,7 @@ class DisparityOptions(ConvertOptions):
         return True
 
     @property
-    def writes(self) -> tuple[Written, ...]:
+    def files(self) -> tuple[Written, ...]:
         """The map, and its picture."""
         maps = ImageOptions(disparity=self.output, save_as=self.save_as).writes(computed=True)
         return *maps, *_picture(self.preview)

@@ -20,7 +20,7 @@ from rollcli.files.storage import create, read_bytes, remove, remove_all, write_
 from rollcli.files.stores.locations import is_object_url, is_url, public_name, within
 from rollcli.files.stores.objects import list_objects
 from rollcli.run.frame import Frame
-from rollcli.run.options import ENDING_OF_FORMAT, FrameOptions, RunningOptions, Written
+from rollcli.run.options import ENDING_OF_FORMAT, FramesOptions, RunningOptions, Written
 
 
 def possible_paths(frame: Frame, writes: Iterable[Written]) -> Iterator[tuple[str, list[str]]]:
@@ -53,7 +53,7 @@ def files_of(frames: Iterable[Frame], writes: Sequence[Written]) -> Iterator[str
         yield from every_path(frame, writes)
 
 
-def write_outputs(frame: Frame, files: Mapping[str, bytes], options: FrameOptions) -> None:
+def write_outputs(frame: Frame, files: Mapping[str, bytes], options: FramesOptions) -> None:
     """Write the files of a frame, each whole or not at all; a failed frame has none.
 
     Parameters
@@ -61,7 +61,7 @@ def write_outputs(frame: Frame, files: Mapping[str, bytes], options: FrameOption
     frame : Frame
     files : mapping from str to bytes
         What is written, by its path.
-    options : FrameOptions
+    options : FramesOptions
         Where it `replaces` files of an earlier run, those that are not written now are removed: they would
         pass for this run's. Otherwise nothing that another run or program wrote is touched. What an earlier
         retry of the result `retry_of` made and did not live to write a row of is taken back: a mark beside

@@ -25,7 +25,7 @@ from rollcli.messages import one_line, printable
 from rollcli.rig.calibration import Calibration, one_factor
 from rollcli.run.diagnosis import require_positive, too_large
 from rollcli.run.frame import Decoded, Frame, FrameResult, failed_frame
-from rollcli.run.options import FrameOptions, RegionOptions
+from rollcli.run.options import FramesOptions, RegionOptions
 from rollcli.stereo.correction import LARGEST
 from rollcli.stereo.options import StereoOptions
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from rollcli.stereo.match import StereoMatch
 
 
-def region_mask(mask: str | None, options: FrameOptions, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
+def region_mask(mask: str | None, options: FramesOptions, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
     """Find the pixels inside all that is given, shape (H, W); None when nothing is given.
 
     Raises
@@ -210,7 +210,7 @@ class Source:
         return self.disparity if self.match is None else self.match.whole
 
 
-def read_source(frame: Frame, options: FrameOptions) -> Source:
+def read_source(frame: Frame, options: FramesOptions) -> Source:
     """Read the frame's map, or match its pair, and draw its region.
 
     Raises
@@ -230,13 +230,13 @@ def read_source(frame: Frame, options: FrameOptions) -> Source:
     return source if allowed is None else replace(source, allowed=allowed)
 
 
-def read_map(frame: Frame, options: FrameOptions) -> Stored:
+def read_map(frame: Frame, options: FramesOptions) -> Stored:
     """Read the numbers of a map as they are stored."""
     rgb = options.encoding.encoding == Encoding.FOUNDATIONSTEREO
     return read_stored(options.at(frame.path), frame.file, rgb=rgb)
 
 
-def _read(frame: Frame, options: FrameOptions) -> Source:
+def _read(frame: Frame, options: FramesOptions) -> Source:
     stored, given = read_map(frame, options), options.encoding
     if given.scale is None or given.scale > 0:
         require_positive(stored, frame.file)
@@ -284,7 +284,7 @@ def _carried(stored: Stored) -> dict[str, Any]:
     }
 
 
-def _match(frame: Frame, options: FrameOptions) -> Source:
+def _match(frame: Frame, options: FramesOptions) -> Source:
     from rollcli.stereo.views import matched_shape
 
     left, right = read_views(frame, options)
@@ -297,17 +297,17 @@ def _match(frame: Frame, options: FrameOptions) -> Source:
     return replace(source, photo=left if drawn_on else None, allowed=allowed)
 
 
-def read_views(frame: Frame, options: FrameOptions) -> tuple[NDArray[Any], NDArray[Any]]:
+def read_views(frame: Frame, options: FramesOptions) -> tuple[NDArray[Any], NDArray[Any]]:
     """Read the left and the right view of a pair: of two images, or of one that holds both."""
     if frame.decoded is not None:
         return frame.decoded.views
     left = read_image(options.at(frame.path), frame.file)
-    if options.side_by_side is not None:
-        return views_of(left, options.side_by_side, frame.file)
+    if (layout := options.pairs.side_by_side) is not None:
+        return views_of(left, layout, frame.file)
     return left, read_image(options.at(frame.right_path), frame.right_file)
 
 
-def decoded(frame: Frame, options: FrameOptions) -> Frame:
+def decoded(frame: Frame, options: FramesOptions) -> Frame:
     """Read the views of a frame of videos before it is handed out; see `Work.prepare`.
 
     One that cannot be read stays as it is: the worker that gets it says why.

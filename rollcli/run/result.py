@@ -11,6 +11,7 @@ import io
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import chain, islice
 
 from rollcli.errors import InputError, UsageError
@@ -20,8 +21,9 @@ from rollcli.files.atomic import is_file, is_folder, is_there, remove_leftovers
 from rollcli.files.locking import exists_already, locked_folder, not_resumable
 from rollcli.files.storage import is_stream, list_names, open_stream, read_bytes, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url, located, public_name
-from rollcli.run.batch import Batch, Parts, Step, part_paths
+from rollcli.run.batch import Batch, BatchOptions, Step, part_paths
 from rollcli.run.frame import Frame
+from rollcli.run.options import EstimateOptions
 from rollcli.run.plan import Plan
 from rollcli.run.progress import RunSummary
 from rollcli.run.result_file import (
@@ -140,18 +142,17 @@ class PartsOutput(Output):
         self._part_rows = record.plan.options.result.part_rows
         output = located(record.plan.options.running.root, record.plan.output)
         of_rows = {key: value for key, value in record.fixed.items() if key != "inputs"}
-        self._parts = Parts(
-            output, self._plan.format, self._plan.further, self._part_rows, (), 0, record.run, of_rows
-        )
+        told = replace(record.plan.options, run=record.run)
+        self._rows = BatchOptions(told, self._plan.further, output, of_rows=of_rows)
         self._waiting: list[tuple[int, bytes, bytes]] = []  # positions, rows, and the lines of their inputs
         self._checked = time.monotonic()
 
-    def parts_of(self, step: Step) -> Parts | None:
+    def rows_of(self, step: Step, told: EstimateOptions) -> BatchOptions:
         """Say which parts the workers write of which they have all rows."""
         if step.retries or not step.positions:
-            return None
+            return super().rows_of(step, told)
         numbers = tuple(position // self._part_rows for position in step.positions[:: self._part_rows])
-        return self._parts._replace(numbers=numbers, frames=len(step.positions))
+        return self._rows._replace(told=told, numbers=numbers, frames=len(step.positions))
 
     def append(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
         """Take the rows; every full part is written."""
@@ -194,12 +195,12 @@ class PartsOutput(Output):
             write_bytes(path, notes, durable=True)
         if lines != old:
             self.record.check_owned()
-            write_bytes(location, self._parts.encoded(number, lines), durable=True)
+            write_bytes(location, self._rows.encoded(number, lines), durable=True)
 
     def _write(self) -> None:
         self._sync_images()
         positions, lines, notes = zip(*self._waiting[: self._part_rows], strict=True)
-        self._parts.write(positions[0] // self._part_rows, lines, notes)
+        self._rows.write(positions[0] // self._part_rows, lines, notes)
         self._rows_there += len(lines)
         self._waiting = self._waiting[self._part_rows :]
 

@@ -26,7 +26,7 @@ from rollcli.files.storage import Note, noting, read_frame, state_of
 from rollcli.files.stores.locations import is_object_url, is_url
 from rollcli.files.stores.objects import list_objects
 from rollcli.run.frame import Frame
-from rollcli.run.options import FrameOptions
+from rollcli.run.options import FramesOptions
 
 _HEADERS = tuple(
     format_header("csv", further)
@@ -247,7 +247,7 @@ _HEX = 16
 _WIDTH = 3 * (_HEX + 1)
 _UNKNOWN = b"-" * _HEX
 _LINE = re.compile(rb"([0-9a-f]{16} )([0-9a-f]{16}|-{16}) ([0-9a-f]{16}|-{16})\n")
-_HERE = FrameOptions()  # paths are those of this machine
+_HERE = FramesOptions()  # paths are those of this machine
 
 
 def inputs_path(result: str) -> str:
@@ -276,7 +276,7 @@ def _line(name: bytes, state: bytes = _UNKNOWN, content: bytes = _UNKNOWN) -> by
     return b" ".join((name, state, content)) + b"\n"
 
 
-def inputs_line(frame: Frame, notes: Mapping[str, Note], options: FrameOptions = _HERE) -> bytes:
+def inputs_line(frame: Frame, notes: Mapping[str, Note], options: FramesOptions = _HERE) -> bytes:
     """Make the line of a frame; of one whose files were not all read, it says nothing of them.
 
     Parameters
@@ -284,7 +284,7 @@ def inputs_line(frame: Frame, notes: Mapping[str, Note], options: FrameOptions =
     frame : Frame
     notes : mapping from str to Note
         What was read for it, by location.
-    options : FrameOptions
+    options : FramesOptions
         They locate the frame's paths on this machine, and name the run.
     """
     found = []

@@ -25,14 +25,16 @@ from rollcli.files.storage import write_bytes
 from rollcli.files.stores.locations import base_name, public_name
 from rollcli.rig.calibration import Calibration
 from rollcli.run import outputs
-from rollcli.run.batch import Batch, Parts, Step, check_owned
+from rollcli.run.batch import Batch, BatchOptions, Step, check_owned
 from rollcli.run.frame import Frame, ReadAs
 from rollcli.run.options import (
     EncodingOptions,
-    FrameOptions,
+    EstimateOptions,
+    FramesOptions,
     ImageOptions,
     Layout,
     MethodOptions,
+    PairOptions,
     RegionOptions,
 )
 from rollcli.run.plan import Plan
@@ -205,7 +207,7 @@ def is_replaceable_record(path: str) -> bool:
         return False
 
 
-def recorded_options(run: Mapping[str, Any] | None, name: str) -> FrameOptions:
+def recorded_options(run: Mapping[str, Any] | None, name: str) -> FramesOptions:
     """Read back how the run read, matched and wrote its frames; the defaults where there is no record.
 
     Parameters
@@ -232,13 +234,13 @@ def recorded_options(run: Mapping[str, Any] | None, name: str) -> FrameOptions:
         else:  # whose file may lie elsewhere by now, or hold another one
             stereo = _filled(StereoOptions(), {**given, "align": "auto"})
             stereo = replace(stereo, align=Correction.of_record(correction))
-        return FrameOptions(
+        return FramesOptions(
             encoding=_filled(EncodingOptions(), given),
             method=_filled(MethodOptions(), given),
             stereo=stereo,
             region=_region(given),
             images=_filled(ImageOptions(), given),
-            side_by_side=layout,
+            pairs=PairOptions(side_by_side=layout),
         )
     except (TypeError, ValueError, KeyError) as error:
         raise InputError(f"{name}: is not the record of a run: {error}") from error
@@ -451,9 +453,9 @@ class Output:
         self._images: list[str] = []  # which must be on the disk before the rows that come next
         self._folders: set[Path] = set()  # whose names are on the disk
 
-    def parts_of(self, step: Step) -> Parts | None:
-        """Say where workers write the rows of a step; None: all come back."""
-        return None
+    def rows_of(self, step: Step, told: EstimateOptions) -> BatchOptions:
+        """Say what workers are told of the rows of a step."""
+        return BatchOptions(told, self._plan.further)
 
     def append(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
         """Add the rows of these positions, which may wait for others."""

@@ -21,7 +21,7 @@ from rollcli.rig.quantities import ALIGNMENT, COLUMNS, QUANTITIES, ROLL
 from rollcli.rig.words import findings
 from rollcli.run.find import calibration_files, calibration_finder
 from rollcli.run.frame import Frame, frame_of_row
-from rollcli.run.options import FrameOptions, RegionOptions, RigOptions
+from rollcli.run.options import FramesOptions, RegionOptions, RigOptions
 from rollcli.run.outputs import check_named_once, listed_only
 from rollcli.run.read import FRAME_ERRORS, read_source
 from rollcli.run.resume import recorded_downscale, recorded_options
@@ -273,7 +273,7 @@ _PAIRS = 24  # matched again, a few seconds: 8 of rendered roads tell a scale to
 _FEWEST = 4
 
 
-def rows_of_drive(pairs: Iterable[tuple[Frame, FrameOptions]]) -> DriveRows | None:
+def rows_of_drive(pairs: Iterable[tuple[Frame, FramesOptions]]) -> DriveRows | None:
     """Match pairs of a drive again, and put together what their rows say.
 
     One pair of an empty road cannot tell a right view that is larger from rows that are bent; the pairs of a
@@ -300,7 +300,7 @@ def rows_of_drive(pairs: Iterable[tuple[Frame, FrameOptions]]) -> DriveRows | No
     return DriveRows(columns, float(np.median([each.misalignment.curve for each in same])))
 
 
-def _pairs(rig: RigAssessment, paths: Sequence[str]) -> Iterator[tuple[Frame, FrameOptions]]:
+def _pairs(rig: RigAssessment, paths: Sequence[str]) -> Iterator[tuple[Frame, FramesOptions]]:
     """Yield measured pairs of the rig as it is now, and how they were matched.
 
     They are spread evenly over the last drive, from the last jump on; with a drift, they are its last ones.
@@ -321,7 +321,7 @@ def _pairs(rig: RigAssessment, paths: Sequence[str]) -> Iterator[tuple[Frame, Fr
     for path, run in zip(paths, runs, strict=True):
         options = recorded_options(results.read_run(path), results.run_path(path))
         stereo = replace(options.stereo, align="auto", vertical_offset=None)
-        options = options._replace(stereo=stereo, region=RegionOptions())
+        options = replace(options, stereo=stereo, region=RegionOptions())
         with suppress(InputError):  # what came by a pipe is gone
             for name, data in results.pieces_of(path):
                 for row in results.parse_rows(data, name):

@@ -40,7 +40,7 @@ prepare_worker()
 from rollcli.run.frame_task import run_frame
 from rollcli.run.frame import Frame
 from rollcli.run.options import *
-options = FrameOptions(EncodingOptions(), StereoOptions(), RegionOptions(), MethodOptions(), ImageOptions())
+options = FramesOptions()
 paths = map(str, sorted(Path(sys.argv[1]).iterdir()))
 frames = [Frame(path, "", path, "", Path(path).name, None) for path in paths]
 with ThreadPoolExecutor(2) as pool:

@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from rollcli.files.encodings import to_disparity
 from rollcli.files.formats import Stored
 from rollcli.run.diagnosis import looks_like
-from rollcli.run.options import FrameOptions
+from rollcli.run.options import FramesOptions
 
 SHARED = Path(__file__).resolve().parents[3] / "shared"
 MAPS = (
@@ -51,7 +51,7 @@ def read(folders: Iterable[str], flags: int) -> list[Values]:
 def verdict(values: Values) -> str:
     """What a file with these numbers looks like."""
     stored = Stored(np.ascontiguousarray(values), "png")
-    said = looks_like(to_disparity(stored).disparity, stored, FrameOptions())
+    said = looks_like(to_disparity(stored).disparity, stored, FramesOptions())
     found = [
         kind
         for kind, word in (("photograph", "photograph"), ("depth", "depth"), ("upside down", "upside"))

@@ -198,11 +198,13 @@ def chunk_costs(scheduler: str, processes: list["subprocess.Popen[bytes]"]) -> d
 def part_cost() -> float:
     """CPU of making and writing a part of Parquet of 1,000 rows, and what they were made from, ms."""
     from rollcli.files.results import Row, format_row
-    from rollcli.run.batch import Parts
+    from rollcli.run.batch import BatchOptions
+    from rollcli.run.options import EstimateOptions, ResultOptions
 
     rows = [format_row(Row(f"maps/{n:06}.png", status="ok", roll_deg=n / 1000), "jsonl") for n in range(1000)]
     with tempfile.TemporaryDirectory() as folder:
-        parts = Parts(f"{folder}/rolls.parquet", "parquet", (), 1000, (), 0, "", {})
+        told = EstimateOptions(result=ResultOptions(format="parquet"))
+        parts = BatchOptions(told, output=f"{folder}/rolls.parquet")
         notes = [bytes(51)] * len(rows)
         parts.write(0, rows, notes)  # loads what is loaded once
         start = time.process_time()

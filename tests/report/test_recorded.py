@@ -26,7 +26,7 @@ from rollcli.report.sources import choose, subjects
 from rollcli.report.summary import common_run, degrees, option_lines, with_interval
 from rollcli.rig.drive.assess import assess_rig
 from rollcli.rig.quantities import ALIGNMENT, HEIGHT, ROLL, SIZE
-from rollcli.run.options import EncodingOptions, FrameOptions, ImageOptions
+from rollcli.run.options import EncodingOptions, FramesOptions, ImageOptions
 from tests.recorded import made, recorded_test
 from tests.report.results import row
 from tests.run.rigs import known, rig, sequence, short
@@ -356,7 +356,9 @@ def _looked_for(rows, there="", images=None, result="rolls.csv", inside=".", **f
         folder_of(each for each in there.split() if "://" not in each),
     ):
         os.chdir(inside)
-        recorded = FrameOptions(images=ImageOptions(**{kind: each or None for kind, each in folders.items()}))
+        recorded = FramesOptions(
+            images=ImageOptions(**{kind: each or None for kind, each in folders.items()})
+        )
         found = made(subjects, given, result, images, recorded)
     if isinstance(found, str):
         return found
@@ -373,7 +375,7 @@ def _subjects():
         return [
             [each.theta, each.row.alpha, each.refused, sorted(each.images.items())]
             for each in subjects(
-                rows, "rolls.csv", "out/", FrameOptions(images=ImageOptions(derotated="a/up"))
+                rows, "rolls.csv", "out/", FramesOptions(images=ImageOptions(derotated="a/up"))
             )
         ]
 
@@ -409,7 +411,7 @@ def _views(quantity):
 def _refused():
     rows = [(replace(row(one), right_file=other), result) for one, other, result in INPUTS["remote"]]
     return [
-        [subjects([each], result, None, FrameOptions(), fetch=fetch)[0].refused for fetch in (False, True)]
+        [subjects([each], result, None, FramesOptions(), fetch=fetch)[0].refused for fetch in (False, True)]
         for each, result in rows
     ]
 
@@ -429,7 +431,7 @@ def _taken(images=(), disparity=ROAD, roll=5.75, camera=None, alpha0=-8.0, **opt
         given = replace(row(f"{folder}/a.npy", roll), alpha0=alpha0, alpha1=0.4, height_m=camera)
         given = replace(given, width=disparity.shape[1], height=disparity.shape[0])
         drawn = ImageOptions(heights_range=(-0.3, 0.3))
-        settings = FrameOptions(encoding=EncodingOptions("px"), images=drawn)
+        settings = FramesOptions(encoding=EncodingOptions("px"), images=drawn)
         (subject,) = subjects([given], f"{folder}/rolls.csv", None, settings)
         subject = replace(subject, images={kind: f"{folder}/{name}" for kind, name in images}, **options)
         with mock.patch.object(cv2, "putText", lambda picture, *_: picture):

@@ -74,9 +74,5 @@ def rig(*drives, changes=None, ok=None, suspect=None, include_suspect=False):
 def options_of(*inputs, images=options.ImageOptions(), **result):  # noqa: B008 (it does not change)
     """The options of a run over inputs, those of its result by name."""
     return options.EstimateOptions(
-        inputs=options.InputOptions(inputs),
-        running=options.RunningOptions(),
-        method=options.MethodOptions(),
-        images=images,
-        result=options.ResultOptions(**result),
+        inputs=options.InputOptions(inputs), images=images, result=options.ResultOptions(**result)
     )

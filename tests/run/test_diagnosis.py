@@ -7,7 +7,7 @@ import pytest
 from rollcli.files.encodings import read_disparity, to_disparity
 from rollcli.files.formats import Stored, read_stored
 from rollcli.run.diagnosis import looks_like, require_positive
-from rollcli.run.options import FrameOptions
+from rollcli.run.options import FramesOptions
 from tests.real_pairs import REALMAPS, STREETS
 from tests.run_cli import ROOT, road_map
 
@@ -18,7 +18,7 @@ PHOTOGRAPH, DEPTH, UPSIDE_DOWN = "looks like a photograph", "looks like a depth 
 
 def verdict(values):
     stored = Stored(np.ascontiguousarray(values), "npy")
-    return looks_like(to_disparity(stored).disparity, stored, FrameOptions())
+    return looks_like(to_disparity(stored).disparity, stored, FramesOptions())
 
 
 @pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.name)
@@ -47,7 +47,7 @@ def test_noise_walls_and_small_maps_are_taken_for_nothing():
     assert verdict(np.full((120, 160), 40, np.uint8)) == ""
     assert verdict(np.array([[1], [2]], np.uint8)) == ""
     assert verdict(np.zeros((5, 5), np.float32)) == ""
-    assert looks_like(road_map(), None, FrameOptions()) == ""  # matched from a pair
+    assert looks_like(road_map(), None, FramesOptions()) == ""  # matched from a pair
 
 
 def test_real_maps_and_photographs_are_told_apart():

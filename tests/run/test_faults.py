@@ -17,7 +17,7 @@ import pytest
 from rollcli.files.results import parse_rows
 from rollcli.run.frame import Frame
 from rollcli.run.frame_task import run_frame
-from rollcli.run.options import FrameOptions
+from rollcli.run.options import FramesOptions
 from tests.run_cli import (
     ROOT,
     command,
@@ -269,7 +269,7 @@ def alive_in_group(group):
 
 def test_the_row_of_a_frame_without_memory_says_so(monkeypatch):
     monkeypatch.setattr("rollcli.run.frame_task.read_source", Mock(side_effect=MemoryError))
-    row = run_frame(Frame("a.png", "", "a.png", "", "a.png", None), FrameOptions()).row
+    row = run_frame(Frame("a.png", "", "a.png", "", "a.png", None), FramesOptions()).row
     assert (row.status, row.message) == ("error", "out of memory")
 
 

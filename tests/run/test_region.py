@@ -8,7 +8,7 @@ import pytest
 
 from rollcli.estimator.moments import usable_of
 from rollcli.estimator.request import Request
-from rollcli.run.options import FrameOptions, RegionOptions
+from rollcli.run.options import FramesOptions, RegionOptions
 from rollcli.run.read import region_mask, road_finder
 from tests.run_cli import rollcli, write_kitti, write_maps
 
@@ -18,7 +18,7 @@ V, U = np.mgrid[: SHAPE[0], : SHAPE[1]]
 
 def allowed(*corners):
     """The pixels inside a polygon."""
-    options = FrameOptions(region=RegionOptions(polygon=tuple(corners)))
+    options = FramesOptions(region=RegionOptions(polygon=tuple(corners)))
     return region_mask(None, options, SHAPE)
 
 
@@ -39,7 +39,7 @@ def test_a_slanted_side_that_reaches_far_keeps_its_place(far):
 
 
 def test_of_a_pair_the_road_is_found_in_the_region():
-    options = FrameOptions(region=RegionOptions(roi=(81, 30, 160, 100)))
+    options = FramesOptions(region=RegionOptions(roi=(81, 30, 160, 100)))
     find_road = road_finder(region_mask(None, options, SHAPE), Request())
     v, u = np.mgrid[:60, :80]
     left, right = 10 + 0.5 * v - 0.1 * u, 12 + 0.4 * v + 0.05 * u
@@ -69,7 +69,7 @@ def test_masks_in_an_archive_are_those_of_a_folder(tmp_path):
 def test_what_is_no_number_in_a_mask_is_not_used(tmp_path):
     values = np.where(V > 30, -1.0, np.where(V > 10, np.nan, 0))
     np.save(tmp_path / "mask.npy", values)
-    found = region_mask(str(tmp_path / "mask.npy"), FrameOptions(), SHAPE)
+    found = region_mask(str(tmp_path / "mask.npy"), FramesOptions(), SHAPE)
     np.testing.assert_array_equal(found, V > 30)
     np.testing.assert_array_equal(usable_of(values), V > 30)
 
@@ -78,14 +78,14 @@ def test_a_mask_below_a_url_is_read_anew_by_each_run(monkeypatch):
     for run, mask in (("first", V > 30), ("second", V > 50)):
         data = cv2.imencode(".png", np.uint8(mask))[1].tobytes()
         monkeypatch.setattr("rollcli.run.read.read_bytes", lambda *_, data=data: data)
-        np.testing.assert_array_equal(region_mask("s3://maps/m.png", FrameOptions(run=run), SHAPE), mask)
+        np.testing.assert_array_equal(region_mask("s3://maps/m.png", FramesOptions(run=run), SHAPE), mask)
 
 
 @pytest.mark.parametrize("depth", [np.uint8, np.uint16])
 def test_transparent_pixels_of_a_mask_are_not_used(tmp_path, depth):
     shown = np.where(V > 60, np.iinfo(depth).max, 0).astype(depth)
     cv2.imwrite(str(tmp_path / "mask.png"), np.dstack([np.full((*SHAPE, 3), 255, depth), shown]))
-    found = region_mask(str(tmp_path / "mask.png"), FrameOptions(), SHAPE)
+    found = region_mask(str(tmp_path / "mask.png"), FramesOptions(), SHAPE)
     np.testing.assert_array_equal(found, V > 60)
 
 

@@ -7,7 +7,7 @@ from rollcli.files.locking import locked_folder
 from rollcli.files.results import Row, read_result
 from rollcli.run.batch import BatchOptions, join_results
 from rollcli.run.frame import FrameResult
-from rollcli.run.options import FrameOptions, ResultOptions
+from rollcli.run.options import EstimateOptions
 from rollcli.run.plan import make_plan
 from rollcli.run.progress import RunSummary
 from rollcli.run.result import open_output
@@ -28,7 +28,7 @@ def plan(bucket, tmp_path):
 
 def append(output, frames, first=0):
     """The rows of frames, as workers would return them."""
-    told = BatchOptions(ResultOptions(), (), FrameOptions(notes=True))
+    told = BatchOptions(EstimateOptions(notes=True))
     for at, frame in enumerate(frames, first):
         result = FrameResult(Row(frame.file, status="ok", roll_deg=1.0))
         output.append([at], [frame], join_results(Span([frame], 0, output.record.read_as), [result], told))

@@ -10,9 +10,9 @@ import pytest
 from rollcli.errors import UsageError
 from rollcli.files.results import Row, format_header, format_row
 from rollcli.files.storage import list_names, remove
-from rollcli.run.batch import BatchOptions, Parts, join_results
+from rollcli.run.batch import BatchOptions, join_results
 from rollcli.run.frame import Frame, FrameResult, ReadAs
-from rollcli.run.options import FrameOptions, ResultOptions
+from rollcli.run.options import EstimateOptions, ResultOptions
 from rollcli.run.result_file import inputs_line
 from rollcli.run.workers.chunks import Chunks, Done, Span, Work
 from tests.object_store import joined
@@ -36,10 +36,10 @@ def noted(first, end):
 
 def join(folder, first, end, *, known=KITTI, fail_fast=False, rows=ROWS, numbers=range(4)):
     """What a worker hands back of frames that a run of eleven has, in parts of three rows."""
-    parts = Parts(str(folder), "csv", (), 3, numbers, len(FRAMES), "run", {})
-    told = BatchOptions(ResultOptions(fail_fast=fail_fast), (), FrameOptions(notes=True), parts=parts)
+    told = EstimateOptions(result=ResultOptions(fail_fast=fail_fast, part_rows=3), notes=True, run="run")
+    rows_of = BatchOptions(told, (), str(folder), numbers, len(FRAMES))
     results = [FrameResult(row, "kitti") for row in rows[first:end]]
-    return join_results(Span(FRAMES[first:end], first, known), results, told)
+    return join_results(Span(FRAMES[first:end], first, known), results, rows_of)
 
 
 @pytest.mark.parametrize(
