@@ -4,8 +4,7 @@ import contextlib
 import errno
 import os
 import sys
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Iterator
 from importlib import import_module
 from typing import Any
 
@@ -79,30 +78,23 @@ class LazyGroup(click.Group):
             raise RuntimeError(f"EOFError: {error}").with_traceback(error.__traceback__) from None
 
     def main(self, *args: Any, standalone_mode: bool = True, **extra: Any) -> Any:
-        """Run the program; outside of tests, exit with its status."""
-        program = partial(super().main, *args, standalone_mode=False, **extra)
-        if not standalone_mode:
-            return program()
-        sys.exit(exit_status(program))
-
-
-def exit_status(program: Callable[[], Any]) -> int:
-    """Run the program; turn an error into one line on stderr and the documented status."""
-    try:
-        status = program()
-    except click.ClickException as error:
-        say(one_line(_with_hint(error)))
-        return error.exit_code
-    except (click.Abort, KeyboardInterrupt):
-        say("interrupted")
-        return ExitStatus.INTERRUPTED
-    except RollcliError as error:
-        say(one_line(str(error)))
-        return ExitStatus.USAGE if isinstance(error, UsageError | InputError) else ExitStatus.FAILED
-    except MemoryError:
-        say("out of memory")
-        return ExitStatus.FAILED
-    return status if isinstance(status, int) else ExitStatus.DONE
+        """Run the program, and always exit with the documented status; an error is one line on stderr."""
+        program: Any = super().main
+        try:
+            status = program(*args, standalone_mode=False, **extra) or ExitStatus.DONE
+        except click.ClickException as error:
+            say(one_line(_with_hint(error)))
+            status = error.exit_code
+        except (click.Abort, KeyboardInterrupt):
+            say("interrupted")
+            status = ExitStatus.INTERRUPTED
+        except RollcliError as error:
+            say(one_line(str(error)))
+            status = ExitStatus.USAGE if isinstance(error, UsageError | InputError) else ExitStatus.FAILED
+        except MemoryError:
+            say("out of memory")
+            status = ExitStatus.FAILED
+        sys.exit(status)
 
 
 def _with_hint(error: click.ClickException) -> str:
