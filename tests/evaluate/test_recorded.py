@@ -31,7 +31,7 @@ from rollcli.evaluate.paper import PAGE, paper_files
 from rollcli.evaluate.paper_tables import all_tables, table_csv
 from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.files.results import Row
-from rollcli.run.options import InputOptions, RegionOptions, RunningOptions
+from rollcli.run.options import InputOptions, RegionOptions
 from tests.estimator.synthetic_maps import bent_road
 from tests.recorded import made, recorded_test
 from tests.report.test_recorded import drawn
@@ -133,7 +133,7 @@ def _figures(tables):
     return module.paper_figures(tables)
 
 
-_asked = partial(PaperOptions, inputs=InputOptions(("maps",)), running=RunningOptions(), output="out")
+_asked = partial(PaperOptions, inputs=InputOptions(("maps",)), output="out")
 
 
 def _page(count=1, seconds=(1.0,), region=None, **experiments):

@@ -11,6 +11,7 @@ from rollcli.files.codecs.arrays import Stored
 from rollcli.files.results import ALIGNMENT_COLUMNS
 from rollcli.rig.calibration import Calibration
 from rollcli.run.read import Source, _carried
+from rollcli.simulate import dataset
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
@@ -18,20 +19,17 @@ from tests.odd_views import seen_by, seen_rolled
 from tests.run_cli import rollcli, rows_of, write_views
 
 VIEWS = ("--left", "left", "--right", "right")
-CAMERA = "P{}: {f} 0 {x} {} 0 {f} {y} 0 0 0 1 0\n"
 
 
 @pytest.fixture(scope="module")
 def pair(tmp_path_factory):
     """A pair in files, whose right view is 0.4 % larger and 1 px lower; its calibration beside it."""
     folder = tmp_path_factory.mktemp("pair")
-    frame = render_frame(FrameSpec(scene="open", roll=math.radians(3), seed=12, colour=False))
-    height, width = frame.right.shape
+    spec = FrameSpec(scene="open", roll=math.radians(3), seed=12, colour=False)
+    frame = render_frame(spec)
     right = seen_by(frame.right, larger_percent=0.4, lower=1)
     write_views(folder, "a.png", frame.left, right)
-    where = {"f": 0.58 * width, "x": (width - 1) / 2, "y": (height - 1) / 2}
-    lines = CAMERA.format(0, 0, **where) + CAMERA.format(1, -0.3 * width, **where)
-    (folder / "calib.txt").write_text(lines)
+    (folder / "calib.txt").write_bytes(dataset.calibration(spec))
     return folder, frame.left, right
 
 
@@ -105,11 +103,7 @@ def test_where_the_right_camera_is_rolled_or_longer_the_interval_holds_the_pitch
 def test_a_map_of_a_pair_whose_right_camera_is_rolled_has_the_pitch_of_its_pair(tmp_path):
     spec = FrameSpec(scene="open", pitch=0.07, principal_point=(319.5, 200.0), seed=12, colour=False)
     write_views(tmp_path, "a.png", render_frame(spec).left, seen_rolled(spec, 0.5))
-    x, y = spec.centre
-    views = ((0, 0), (1, -spec.focal * spec.baseline))
-    (tmp_path / "calib.txt").write_text(
-        "".join(CAMERA.format(*view, f=spec.focal, x=x, y=y) for view in views)
-    )
+    (tmp_path / "calib.txt").write_bytes(dataset.calibration(spec))
     of_pair = row_of(tmp_path, *VIEWS)
     assert rollcli("disparity", *VIEWS, "-o", "maps", cwd=tmp_path).status == 0
     of_map = row_of(tmp_path, "maps")

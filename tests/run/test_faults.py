@@ -219,10 +219,9 @@ def test_a_worker_that_dies_while_it_writes_an_image_leaves_nothing_behind(maps,
     (maps / "out").mkdir()
     hook = f"FRAME, AFTER = {frame!r}, {after}\n{DEADLY_NAMES}"
 
-    done = rollcli(*line.split(), "-j2", cwd=maps, **hooked(maps, hook))
+    rollcli(*line.split(), "-j2", cwd=maps, **hooked(maps, hook), status=0)
 
     assert (maps / "died").exists()
-    assert done.status == 0, done.err
     assert contents(maps / "out") == expected
 
 

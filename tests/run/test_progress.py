@@ -10,15 +10,14 @@ import pytest
 
 from rollcli.files.results import Row
 from rollcli.run.frame import Frame, failed_frame
-from rollcli.run.options import FramesOptions, InputOptions, RunningOptions
+from rollcli.run.options import FramesOptions, RunningOptions
 from rollcli.run.progress import Progress, RunSummary, TaskProgress
 
 MAP = Frame("a.png", "", "a.png", "", "a.png", None)
 
 
 def test_of_many_causes_the_first_five_are_said(capsys):
-    options = FramesOptions(inputs=InputOptions(), running=RunningOptions(quiet=True))
-    counted = Progress(3, options, ("ok",))
+    counted = Progress(3, FramesOptions(running=RunningOptions(quiet=True)), ("ok",))
     for cause in "abcdefg":
         counted.add(failed_frame(MAP, cause, cause))
     counted.tell_end()

@@ -22,7 +22,6 @@ def run(task):
         "touch": _touch,
         "die": _die,
         "die_once": _die_once,
-        "die_then_look": _die_then_look,
         "hold": _hold,
         "append": _append,
         "signals": _signals,
@@ -72,15 +71,6 @@ def _hold(path, event):
     _wait(event)
     Path(path).unlink()
     return "held"
-
-
-def _die_then_look(mark, path):
-    """Die once the file is there; the second time tell whether it is."""
-    if Path(mark).exists():
-        return Path(path).exists()
-    Path(mark).touch()
-    _wait(path)
-    return _die()
 
 
 def _append(path, text):
