@@ -15,12 +15,10 @@ from rollcli.errors import UsageError
 from rollcli.files.atomic import remove_leftovers, sync_files
 from rollcli.files.containers import file_of
 from rollcli.files.results import (
-    Format,
     column_types,
     encode_parquet,
     format_header,
     format_row,
-    part_name,
     run_path,
 )
 from rollcli.files.storage import create, write_bytes
@@ -30,7 +28,7 @@ from rollcli.run.frame import Frame, FrameResult, ReadAs, failed_frame
 from rollcli.run.options import EstimateOptions, FramesOptions
 from rollcli.run.outputs import files_of, local_files, write_outputs
 from rollcli.run.progress import Figures
-from rollcli.run.result_file import inputs_line, part_inputs_path
+from rollcli.run.result_file import inputs_line, part_paths
 from rollcli.run.workers.chunks import Span, Work, Workers
 
 
@@ -117,11 +115,6 @@ class Step(NamedTuple):
     frames: Sequence[Frame]
     positions: Sequence[int] = ()
     retries: bool = False
-
-
-def part_paths(output: str, form: Format, number: int) -> tuple[str, str]:
-    """Return where a part lies, and where what its rows were made from."""
-    return f"{output}/{part_name(number, form)}", part_inputs_path(output, number)
 
 
 def check_owned(output: str, run: str) -> None:

@@ -72,8 +72,12 @@ def _done(frame: Frame, options: FramesOptions) -> tuple[FrameResult, dict[str, 
     if isinstance(options, ConvertOptions) and frame.row is not None and frame.row.map_roll_deg is None:
         raise InputError(f"{frame.file}: has no angle in {options.result}")
     source = read_source(frame, options)
-    make = _converted if isinstance(options, ConvertOptions) else _estimated
-    row, files, warnings = make(frame, source, options)
+    if isinstance(options, ConvertOptions):
+        files, warnings = _MAKERS[type(options)](source, frame, options, _usual_paths(frame, options))
+        row = Row(frame.file, frame.right_file, "ok", **source.alignment)
+        warnings = {**source.doubts, **warnings}
+    else:
+        row, files, warnings = _estimated(frame, source, options)
     downscale = 1.0 if source.size is None else source.size[0] / source.disparity.shape[1]
     return FrameResult(row, source.encoding, warnings, source.searched, downscale), files
 
@@ -207,14 +211,6 @@ def encode_heights(heights: NDArray[np.float32], save_as: str, unit: str) -> byt
     """Encode heights over the road as a float32 TIFF, which names their unit, or NPY."""
     form = "npy" if save_as == "npy" else "tiff"
     return encode_stored(heights, form, text=f"height over the road, {unit}")
-
-
-def _converted(frame: Frame, source: Source, options: FramesOptions) -> _Made:
-    """Make the files that a conversion makes of a frame."""
-    make = _MAKERS[type(options)]
-    files, warnings = make(source, frame, options, _usual_paths(frame, options))
-    row = Row(frame.file, frame.right_file, "ok", **source.alignment)
-    return row, files, {**source.doubts, **warnings}
 
 
 def _rotated(source: Source, of: Frame, options: DerotateOptions, paths: Mapping[str, str]) -> _Files:

@@ -40,20 +40,6 @@ class ImageKind(NamedTuple):
     name: str
     holds: Literal["picture", "map", "as input", "numbers"]
 
-    def endings(self, save_as: Save, *, computed: bool) -> tuple[str | None, ...]:
-        """Return the endings that its files may have, the usual one first; None for that of the input.
-
-        A TIFF takes the place of a KITTI PNG that cannot hold the map. `computed`: from a pair.
-        """
-        if self.holds == "picture":
-            return (ENDING_OF_FORMAT["png"],)
-        if self.holds == "numbers":
-            return (ENDING_OF_FORMAT["tiff" if save_as == "png" else save_as],)
-        if self.holds == "as input" and not computed:
-            return (None,)
-        formats: tuple[Save, ...] = ("png", "tiff") if save_as == "png" else (save_as,)
-        return tuple(ENDING_OF_FORMAT[each] for each in formats)
-
 
 class Written(NamedTuple):
     """A file that is written for each frame, named after it.
@@ -279,12 +265,21 @@ class ImageOptions(NamedTuple):
     save_as: Save = "png"
 
     def writes(self, *, computed: bool) -> tuple[Written, ...]:
-        """List the images that were requested; `computed`: of maps that are computed from pairs."""
+        """List the images that were requested; `computed`: of maps that are computed from pairs.
+
+        A TIFF takes the place of a KITTI PNG that cannot hold the map.
+        """
+        png, tiff, asked = (ENDING_OF_FORMAT[each] for each in ("png", "tiff", self.save_as))
+        maps = (png, tiff) if asked == png else (asked,)
+        endings: dict[str, tuple[str | None, ...]] = {
+            "picture": (png,),
+            "map": maps,
+            "as input": maps if computed else (None,),
+            "numbers": maps[-1:],
+        }
         named = ((kind, getattr(self, kind.name)) for kind in KINDS)
         return tuple(
-            Written(kind.name, folder, kind.endings(self.save_as, computed=computed))
-            for kind, folder in named
-            if folder is not None
+            Written(kind.name, folder, endings[kind.holds]) for kind, folder in named if folder is not None
         )
 
 

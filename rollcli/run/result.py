@@ -21,21 +21,22 @@ from rollcli.files.atomic import is_file, is_folder, is_there, remove_leftovers
 from rollcli.files.locking import exists_already, locked_folder, not_resumable
 from rollcli.files.storage import is_stream, list_names, open_stream, read_bytes, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url, located, public_name
-from rollcli.run.batch import Batch, BatchOptions, Step, part_paths
+from rollcli.run.batch import Batch, BatchOptions, Step
 from rollcli.run.frame import Frame
 from rollcli.run.options import EstimateOptions
 from rollcli.run.plan import Plan
 from rollcli.run.progress import RunSummary
 from rollcli.run.result_file import (
+    PART_INPUTS,
     Inputs,
     ResultFile,
     data_of,
     has_rows,
     inputs_path,
     is_inputs,
-    is_part_inputs,
     kept_rows,
     open_result,
+    part_paths,
     row_lines,
     split_lines,
 )
@@ -320,9 +321,10 @@ def _begin_parts(plan: Plan) -> PartsOutput:
     rows = plan.options.result.part_rows
     whole = set(range(_whole_parts(kept.count, rows))).difference(at // rows for at in kept.holes)
     stay = {path for number in whole for path in part_paths(plan.output, plan.format, number)}
-    inputs = [f"{inputs_path(plan.output)}/{name}" for name in list_names(inputs_path(plan.output))]
+    folder = inputs_path(plan.output)
+    inputs = (f"{folder}/{name}" for name in list_names(folder) if name.endswith(f".{PART_INPUTS}"))
     # in this order, no part is ever without its inputs
-    for path in (*(f"{plan.output}/{name}" for name in parts), *filter(is_part_inputs, inputs)):
+    for path in (*(f"{plan.output}/{name}" for name in parts), *inputs):
         if path not in stay:
             remove(path)
     record.write()

@@ -242,7 +242,7 @@ def _reopen(descriptor: int, path: str, flags: int) -> None:
         os.close(opened)
 
 
-_PART_ENDING = "inputs"
+PART_INPUTS = "inputs"  # the ending of their names
 _HEX = 16
 _WIDTH = 3 * (_HEX + 1)
 _UNKNOWN = b"-" * _HEX
@@ -255,14 +255,10 @@ def inputs_path(result: str) -> str:
     return f"{result}.inputs"
 
 
-def part_inputs_path(result: str, number: int) -> str:
-    """Return where the lines of a part lie."""
-    return f"{inputs_path(result)}/{part_name(number, _PART_ENDING)}"
-
-
-def is_part_inputs(path: str) -> bool:
-    """Tell whether a file is named like one with the lines of a part."""
-    return path.endswith(f".{_PART_ENDING}")
+def part_paths(result: str, form: Format, number: int) -> tuple[str, str]:
+    """Return where a part lies, and where what its rows were made from."""
+    inputs = f"{inputs_path(result)}/{part_name(number, PART_INPUTS)}"
+    return f"{result}/{part_name(number, form)}", inputs
 
 
 def is_inputs(path: str) -> bool:
