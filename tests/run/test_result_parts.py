@@ -13,7 +13,6 @@ from tests.run_cli import contents, leave_half, rollcli, write_maps
 @pytest.fixture
 def parts(tmp_path):
     """A whole result of three parts, and the command that made it."""
-    pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
     line = ("estimate", "maps", "-o", "rolls.parquet", "--part-rows", "2")
     write_maps(tmp_path / "maps", 6)
     assert rollcli(*line, cwd=tmp_path).status == 0

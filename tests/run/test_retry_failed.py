@@ -74,8 +74,6 @@ def assert_is_as_anew(folder, line):
 
 @pytest.mark.parametrize("result", mostly_slow(["rolls.csv", "rolls.jsonl", "rolls.parquet"], "rolls.csv"))
 def test_frames_whose_files_were_mended_end_in_the_bytes_of_a_run_without_failures(folder, maps, result):
-    if result.endswith("parquet"):
-        pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
     line = ("estimate", "maps", "-o", result, "--derotated", "up", "--part-rows", "5")
     assert rollcli(*line, cwd=folder).status == 3
     mend(folder, maps, 2, 9)
@@ -133,8 +131,6 @@ def test_a_retry_killed_at_any_time_loses_no_row_and_is_taken_up_again(tmp_path)
 def test_a_run_that_ends_between_rows_and_what_says_of_their_files_is_taken_up_again(
     folder, maps, monkeypatch, result, flags
 ):
-    if result.endswith("parquet"):
-        pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
     line = ("estimate", "maps", "-o", result, "--derotated", "up")
     assert rollcli(*line, cwd=folder).status == 3
     mend(folder, maps, *BROKEN)
@@ -170,8 +166,6 @@ def test_a_link_to_a_result_stays_one_and_its_file_keeps_its_rights(folder, maps
 @pytest.fixture(params=mostly_slow(["rolls.csv", "rolls.parquet", "bucket"], "rolls.csv"))
 def stopped(request, folder, maps, monkeypatch):
     """A folder, and the line of a run whose retry made images and could not write their rows."""
-    if request.param == "rolls.parquet":
-        pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
     place = f"{request.getfixturevalue('bucket')}/" if request.param == "bucket" else ""
     result = "rolls.csv" if place else request.param
     line = ("estimate", "maps", "-o", place + result, "--derotated", f"{place}up", "--part-rows", "5")

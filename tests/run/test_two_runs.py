@@ -80,7 +80,6 @@ def test_two_runs_that_begin_in_the_same_second_are_told_apart_at_once(plan, mon
 
 
 def test_a_folder_of_parts_on_disk_is_locked_while_a_run_writes_it(tmp_path, monkeypatch):
-    pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
     monkeypatch.setattr("rollcli.files.locking._PATIENCE_S", 0.0)
     write_maps(tmp_path / "maps", 2)
     line = ("estimate", "maps", "-o", "rolls.parquet")

@@ -55,11 +55,7 @@ def anew(folder, tmp_path_factory, result):
 
 @pytest.mark.parametrize("form", mostly_slow(["csv", "parquet"], "csv"))
 def test_a_resume_of_parts_takes_identical_bytes_with_other_times_and_no_others(folder, request, form):
-    if form == "parquet":
-        pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
-        place = str(folder / "parts")
-    else:
-        place = request.getfixturevalue("bucket")
+    place = str(folder / "parts") if form == "parquet" else request.getfixturevalue("bucket")
 
     def everything(name, less=""):
         return objects_below(f"{place}/{name}.{form}{less}")

@@ -115,7 +115,6 @@ def test_parts_of_several_workers_are_the_file_of_one_process(maps, bucket, rows
 @pytest.mark.parametrize("missing", mostly_slow([[0], [1, 2, 5], [0, 11], range(12)], [1, 2, 5]))
 @pytest.mark.parametrize("jobs", mostly_slow(["1", "2"], "1"))
 def test_a_resume_does_the_parts_that_are_missing_wherever_they_are_and_no_others(maps, missing, jobs):
-    pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
     line = ("estimate", "maps", "-o", "rolls.parquet", "--part-rows", "2", "-j", jobs)
     undisturbed = rollcli(*line, cwd=maps)
     whole, places = contents(maps), {}
@@ -153,7 +152,6 @@ def test_a_hole_is_filled_before_a_failed_frame_of_a_later_part_is_done_again(ma
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_runs_that_are_stopped_and_killed_end_in_the_parts_of_an_undisturbed_one(tmp_path, seed):
-    pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
     write_maps(tmp_path / "maps", 300, width=320, height=240)
     line = ("estimate", "../maps", "-o", "rolls.parquet", "--part-rows", "4", "-j", "2")
     for name in ("whole", "disturbed"):
