@@ -4,7 +4,6 @@ import math
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 from numpy.typing import ArrayLike, NDArray
@@ -119,7 +118,12 @@ def estimate_roll(
     if rig is not None and values.ndim == 2:
         own = rig.for_size(*values.shape[::-1])
         request = replace(request, middle=own.cx, doffs=own.doffs)
-    like = partial(_likeness, values, seed)
+
+    def like() -> str:
+        if values.dtype.kind not in "fiu" or not values.size:
+            return ""
+        return looks_like(*_in_pixels(values), FramesOptions(method=MethodOptions(seed=seed)), python=True)
+
     estimate, likeness = estimate_or_liken(values, request, like, mask=mask, road_mask=road_mask)
     beyond = ""
     if rig is not None and (values > values.shape[1]).any():  # most maps need not be read again for this
@@ -133,13 +137,6 @@ def _in_pixels(values: NDArray[Any]) -> tuple[NDArray[Any], Stored]:
     """Return an array as a file of it would be read, pixels with 0 for no data, and as it is."""
     stored = Stored(values, "npy")
     return to_disparity(stored, encoding="px").disparity, stored
-
-
-def _likeness(values: NDArray[Any], seed: int) -> str:
-    """Say what an array without a sure angle looks like instead of a map; empty when like nothing known."""
-    if values.dtype.kind not in "fiu" or not values.size:
-        return ""
-    return looks_like(*_in_pixels(values), FramesOptions(method=MethodOptions(seed=seed)), python=True)
 
 
 def estimate_pair(
