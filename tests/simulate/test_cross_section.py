@@ -5,10 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from rollcli.simulate.build import build_scene
-from rollcli.simulate.road import draw_carriageway
-from rollcli.simulate.scene import draw_light
-from rollcli.simulate.spec import FrameSpec, Stream
+from rollcli.simulate.build import build_scene, carriageway_of
+from rollcli.simulate.spec import FrameSpec
 from rollcli.simulate.surfaces import Ground
 from tests.slow import mostly_slow
 from tests.true_disparity import true_disparity
@@ -16,13 +14,6 @@ from tests.true_disparity import true_disparity
 SMALL = {"size": (320, 240), "focal": 186.0, "crossfall": 0.04}
 SHAPES = ("crown", "roof", "dish", "superelevated")
 BENT, STRAIGHT = 4, 2  # seeds of an open road
-
-
-def drawn_road(spec):
-    """The carriageway that the frame's random numbers stand for."""
-    rng = spec.rng(Stream.SCENE)
-    draw_light(rng)
-    return draw_carriageway(rng, spec)
 
 
 def road_height(spec, road, lateral):
@@ -96,7 +87,7 @@ def test_every_road_pixel_shows_the_first_point_that_a_march_along_its_ray_finds
 ):
     roll, pitch = map(math.radians, (roll_deg, pitch_deg))
     spec = FrameSpec("open", roll, pitch, curvature, shape, gutter=gutter, seed=seed, **SMALL)
-    road = drawn_road(spec)
+    road = carriageway_of(spec)
     assert (road.course.bend != 0) == (seed == BENT)
     disparity, is_road = true_disparity(spec)
     near = is_road & (disparity > spec.focal * spec.baseline / 40)
@@ -114,7 +105,7 @@ def test_every_road_pixel_shows_the_first_point_that_a_march_along_its_ray_finds
 def test_the_ground_of_a_country_road_has_no_steps(shape, scene, seed):
     crossfall = 0.0 if shape == "flat" else 0.04
     spec = FrameSpec(scene, cross_section=shape, crossfall=crossfall, gutter=0.1, seed=seed)
-    road, grounds = drawn_road(spec), [s for s in build_scene(spec).surfaces if isinstance(s, Ground)]
+    road, grounds = carriageway_of(spec), [s for s in build_scene(spec).surfaces if isinstance(s, Ground)]
     edges = {edge for ground in grounds for edge in ground.edges if math.isfinite(edge)}
     assert len(edges) >= 2
     down = np.array([[0.0], [-1.0], [0.0]])

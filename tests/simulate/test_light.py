@@ -78,14 +78,9 @@ def averaged(pattern, centre, width):
 
 
 @pytest.mark.parametrize("width", [0.01, 0.3, 2.0, 25.0])
-def test_a_band_covers_its_share_of_a_pixel(width):
+def test_a_band_and_bars_cover_their_share_of_a_pixel_however_many_it_holds(width):
     x = np.linspace(-3, 3, 101, dtype=np.float32)
-    expected = averaged(lambda t: (t > -0.4) & (t < 0.7), x, width)
-    assert np.allclose(band(x, -0.4, 0.7, np.full_like(x, width)), expected, atol=1e-3)
-
-
-@pytest.mark.parametrize("width", [0.01, 0.3, 2.0, 25.0])
-def test_bars_cover_their_share_of_a_pixel_however_many_it_holds(width):
-    x = np.linspace(-3, 3, 101, dtype=np.float32)
-    expected = averaged(lambda t: np.mod(t, 1.3) < 0.4, x, width)
-    assert np.allclose(bars(x, 1.3, 0.4, np.full_like(x, width)), expected, atol=2e-3)
+    of_band = averaged(lambda t: (t > -0.4) & (t < 0.7), x, width)
+    assert np.allclose(band(x, -0.4, 0.7, np.full_like(x, width)), of_band, atol=1e-3)
+    of_bars = averaged(lambda t: np.mod(t, 1.3) < 0.4, x, width)
+    assert np.allclose(bars(x, 1.3, 0.4, np.full_like(x, width)), of_bars, atol=2e-3)
