@@ -11,7 +11,7 @@ from rollcli.estimator.request import Request
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import encode_stored, read_stored
 from rollcli.run import batch
-from tests.run_cli import contents, interrupt_in, road_map, rollcli, rows_of, write_kitti
+from tests.run_cli import contents, interrupt_in, road_map, rollcli, write_kitti
 
 FRAMES = 4
 TYPES = {
@@ -87,25 +87,6 @@ def test_an_interrupted_run_says_that_what_is_written_is_whole(maps, monkeypatch
     done = rollcli("derotate", "maps", "--roll", "2", "-o", "out", cwd=maps, status=130)
     assert "interrupted; what is written is whole, and --overwrite starts anew" in done.err
     assert contents(maps / "out") == {"frame0.png": contents(maps / "whole")["frame0.png"]}
-
-
-def test_a_map_whose_pixels_are_not_square_is_turned_by_the_images_angle(tmp_path):
-    roll = math.radians(4)
-    disparity = road_map(roll)
-    (tmp_path / "maps").mkdir()
-    np.save(tmp_path / "maps" / "one.npy", disparity)
-    camera = "P{}: 200 0 79.5 {} 0 100 59.5 0 0 0 1 0\n"
-    (tmp_path / "calib.txt").write_text(camera.format(0, 0) + camera.format(1, -100))
-    rollcli("estimate", "maps", "--calib", "calib.txt", "-o", "rolls.csv", cwd=tmp_path, status=0)
-    (row,) = rows_of((tmp_path / "rolls.csv").read_text())
-    assert float(row["image_roll_deg"]) == pytest.approx(4, abs=0.02)
-    rig_deg = math.degrees(math.atan(2 * math.tan(roll)))
-    assert float(row["roll_deg"]) == pytest.approx(rig_deg, abs=0.05)
-
-    assert rollcli("derotate", "maps", "--from", "rolls.csv", "-o", "out", cwd=tmp_path).status == 0
-
-    left = estimate_roll(np.load(tmp_path / "out" / "one.npy"))
-    assert math.degrees(left.theta) == pytest.approx(0, abs=0.05)
 
 
 def test_copies_of_maps_are_known_by_the_calibration_that_the_maps_had(tmp_path):
