@@ -198,12 +198,10 @@ def join_results(frames: Span[Frame], results: Sequence[FrameResult], options: B
     UsageError, OutputError
         A part cannot be written.
     """
-    figures = Figures.of([result.row for result in results])
-    ends = options.told.result.fail_fast and figures.first_error >= 0
-    if ends:
-        results = results[: figures.first_error + 1]
-        figures = Figures.of([result.row for result in results])
-    read_as = ReadAs()
+    failed = (number for number, each in enumerate(results, 1) if each.row.status == "error")
+    end = next(failed, None) if options.told.result.fail_fast else None
+    results = results[:end]
+    figures, read_as = Figures.of([result.row for result in results]), ReadAs()
     kinds = {(each.encoding, each.searched, each.downscale) for each in results}
     for encoding, searched, downscale in kinds:
         read_as = read_as.joined(ReadAs(frozenset(filter(None, [encoding])), searched, downscale))
@@ -213,7 +211,7 @@ def join_results(frames: Span[Frame], results: Sequence[FrameResult], options: B
     made = zip(frames, results, strict=False) if options.told.notes else ()
     notes = [result.inputs or inputs_line(frame, {}) for frame, result in made]
     in_parts = 0
-    if options.output and not ends and known.joined(read_as) == known:
+    if options.output and end is None and known.joined(read_as) == known:
         in_parts = _write_parts(frames, figures.status, lines, notes, options)
     told = list(results) if options.told.running.verbose else list(_told(results))
     return Batch(figures, in_parts, lines[in_parts:], notes[in_parts:], read_as, told)

@@ -34,9 +34,9 @@ def noted(first, end):
     return [inputs_line(frame, {}) for frame in FRAMES[first:end]]
 
 
-def join(folder, first, end, *, known=KITTI, fail_fast=False, rows=ROWS, numbers=range(4)):
+def join(folder, first, end, *, known=KITTI, rows=ROWS, numbers=range(4)):
     """What a worker hands back of frames that a run of eleven has, in parts of three rows."""
-    told = EstimateOptions(result=ResultOptions(fail_fast=fail_fast, part_rows=3), notes=True, run="run")
+    told = EstimateOptions(result=ResultOptions(part_rows=3), notes=True, run="run")
     rows_of = BatchOptions(told, (), str(folder), numbers, len(FRAMES))
     results = [FrameResult(row, "kitti") for row in rows[first:end]]
     return join_results(Span(FRAMES[first:end], first, known), results, rows_of)
