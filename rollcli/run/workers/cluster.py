@@ -93,16 +93,13 @@ class ClusterExecutor(Generic[Task, Result]):
         self._threads_of: dict[str, int] = {}  # by the addresses of the workers that take part
         self._refused: set[str] = set()
         self._in_flight: weakref.WeakSet[ClusterFuture[Task, Result]] = weakref.WeakSet()
-        self._resources = contextlib.ExitStack()
-        self._resources.enter_context(_silenced_logging())
-        try:
+        with contextlib.ExitStack() as resources:
+            resources.enter_context(_silenced_logging())
             self._client = _connect(self.address)
-            self._resources.callback(self._client.close, timeout=2)
+            resources.callback(self._client.close, timeout=2)
             for worker, problem in self._look_for_workers().items():
                 raise WorkerError(f"worker {worker}: {problem}")
-        except BaseException:
-            self._resources.close()
-            raise
+            self._resources = resources.pop_all()  # until it is closed
 
     @property
     def workers(self) -> int:
