@@ -4,14 +4,12 @@ import itertools
 import random
 import threading
 from collections import Counter
-from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from types import SimpleNamespace
 
 import pytest
 
 from rollcli.errors import InputError, WorkerDiedError
-from rollcli.files.stores.locations import waiting_for_network
 from rollcli.run.workers import chunks as chunk_sizes
 from rollcli.run.workers.chunks import Chunk, Done, Work, Workers
 from rollcli.run.workers.interrupt import Stop
@@ -214,23 +212,6 @@ def test_an_error_ends_a_chunk_after_the_results_before_it():
     assert done.results == [0, 1]
     assert isinstance(done.error, RuntimeError)
     assert "ValueError in " in str(done.error)
-
-
-def test_what_overtook_a_failed_task_is_no_result_of_its_chunk():
-    overtaken = threading.Event()
-
-    def fail(task):
-        if task == 1:
-            with waiting_for_network():
-                overtaken.wait(timeout=10)
-            raise ValueError(task)
-        if task == 2:
-            overtaken.set()
-        return task
-
-    with ThreadPoolExecutor(3) as threads:
-        done = Chunk(job_of(fail), range(3), threading.Event(), threads).done()
-    assert (done.results, type(done.error)) == ([0], RuntimeError)
 
 
 class InOrder:
