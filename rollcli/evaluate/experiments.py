@@ -328,7 +328,7 @@ def examine_file(frame: Frame, options: PaperOptions, truth: Mapping[str, KnownP
         findings = examine(frame.file, _usable_pixels(source), turns, theta, chosen=options.has_region)
     except FRAME_ERRORS as error:
         return frame_of_error(frame, error), None
-    return FrameResult(Row(frame.file, status="ok"), source.encoding, source.warnings), findings
+    return FrameResult(Row(frame.file, status="ok"), source.read_as, source.warnings), findings
 
 
 def time_file(frame: Frame, options: PaperOptions) -> Times:

@@ -8,7 +8,7 @@ reads, estimates and draws.
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import partial, reduce
 from typing import Any, NamedTuple
 
 from rollcli.errors import UsageError
@@ -201,10 +201,8 @@ def join_results(frames: Span[Frame], results: Sequence[FrameResult], options: B
     failed = (number for number, each in enumerate(results, 1) if each.row.status == "error")
     end = next(failed, None) if options.told.result.fail_fast else None
     results = results[:end]
-    figures, read_as = Figures.of([result.row for result in results]), ReadAs()
-    kinds = {(each.encoding, each.searched, each.downscale) for each in results}
-    for encoding, searched, downscale in kinds:
-        read_as = read_as.joined(ReadAs(frozenset(filter(None, [encoding])), searched, downscale))
+    figures = Figures.of([result.row for result in results])
+    read_as = reduce(ReadAs.joined, {each.read_as for each in results}, ReadAs())
     # those of Parquet are JSON until a part is full
     lines = [format_row(result.row, options.told.result.form, options.further) for result in results]
     known: ReadAs = frames.told
@@ -237,7 +235,7 @@ def _told(results: Sequence[FrameResult]) -> Iterator[FrameResult]:
     """Yield the results that say something which those before them do not."""
     known: set[str] = {""}
     for result in results:
-        says = {result.encoding, "searched" if result.searched else ""} - known
+        says = {*result.read_as.encodings, "searched" if result.read_as.searched else ""} - known
         if says or result.warning or result.row.status == "error":
             known |= says
             yield result

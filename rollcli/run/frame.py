@@ -86,7 +86,17 @@ class Decoded(NamedTuple):
 
 
 class ReadAs(NamedTuple):
-    """How frames were read: the encodings, the first and last disparity searched, px, and `downscale`."""
+    """How frames were read, as far as they were.
+
+    Attributes
+    ----------
+    encodings : frozenset of str
+        How the numbers of maps were read.
+    searched : tuple of int, or None
+        First and last disparity searched, px; pairs only.
+    downscale : float
+        By how much wider than a map the images are that it was matched from.
+    """
 
     encodings: frozenset[str] = frozenset()
     searched: tuple[int, int] | None = None
@@ -106,14 +116,9 @@ class FrameResult:
     Attributes
     ----------
     row : Row
-    encoding : str
-        How the map's numbers were read; empty for pairs and failed frames.
+    read_as : ReadAs
     warnings : mapping of str to str
         Why that may be wrong, and what else the user should know; by code, those that are empty left out.
-    searched : tuple of int, or None
-        First and last disparity searched, px; pairs only.
-    downscale : float
-        By how much wider than the map the images are that it was matched from.
     inputs : bytes
         What the frame was read from, where workers were told to note it: see `result_file.inputs_line`.
     cause : str
@@ -123,10 +128,8 @@ class FrameResult:
     """
 
     row: Row
-    encoding: str = ""
+    read_as: ReadAs = field(default_factory=ReadAs)
     warnings: Mapping[str, str] = field(default_factory=dict)
-    searched: tuple[int, int] | None = None
-    downscale: float = 1.0
     inputs: bytes = b""
     cause: str = ""
     said: str = ""

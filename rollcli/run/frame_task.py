@@ -78,8 +78,7 @@ def _done(frame: Frame, options: FramesOptions) -> tuple[FrameResult, dict[str, 
         warnings = {**source.doubts, **warnings}
     else:
         row, files, warnings = _estimated(frame, source, options)
-    downscale = 1.0 if source.size is None else source.size[0] / source.disparity.shape[1]
-    return FrameResult(row, source.encoding, warnings, source.searched, downscale), files
+    return FrameResult(row, source.read_as, warnings), files
 
 
 def _estimated(frame: Frame, source: Source, options: FramesOptions) -> _Made:

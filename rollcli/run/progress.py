@@ -355,10 +355,9 @@ class Progress(TaskProgress):
 
     def _tell_input(self, result: FrameResult) -> None:
         """Say once how numbers were read, and which disparities were searched."""
-        name, searched = result.row.file, result.searched
-        if result.encoding and self._auto:
-            how = f"{name}: read as {result.encoding} ({_MEANING[result.encoding]})"
-            self.note(how, topic=result.encoding)
+        name, searched = result.row.file, result.read_as.searched
+        for encoding in result.read_as.encodings if self._auto else ():
+            self.note(f"{name}: read as {encoding} ({_MEANING[encoding]})", topic=encoding)
         if warning := result.warning:
             code = " ".join(filter(result.warnings.get, result.warnings))
             line = f"{name}: warning: {warning}"

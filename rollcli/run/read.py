@@ -24,7 +24,7 @@ from rollcli.files.storage import noting, read_bytes, state_of
 from rollcli.messages import one_line, printable
 from rollcli.rig.calibration import Calibration, one_factor
 from rollcli.run.diagnosis import require_positive, too_large
-from rollcli.run.frame import Decoded, Frame, FrameResult, failed_frame
+from rollcli.run.frame import Decoded, Frame, FrameResult, ReadAs, failed_frame
 from rollcli.run.options import FramesOptions, RegionOptions
 from rollcli.stereo.correction import LARGEST
 from rollcli.stereo.options import StereoOptions
@@ -203,6 +203,12 @@ class Source:
         larger, clockwise = self.levelled
         right, below = calibration.right_axis(width, height)
         return replace(calibration, doffs=calibration.doffs + clockwise * below - larger * right)
+
+    @property
+    def read_as(self) -> ReadAs:
+        """How it was read or matched."""
+        downscale = 1.0 if self.size is None else self.size[0] / self.disparity.shape[1]
+        return ReadAs(frozenset(filter(None, [self.encoding])), self.searched, downscale)
 
     @property
     def shown(self) -> NDArray[Any]:

@@ -38,7 +38,7 @@ def join(folder, first, end, *, known=KITTI, rows=ROWS, numbers=range(4)):
     """What a worker hands back of frames that a run of eleven has, in parts of three rows."""
     told = EstimateOptions(result=ResultOptions(part_rows=3), notes=True, run="run")
     rows_of = BatchOptions(told, (), str(folder), numbers, len(FRAMES))
-    results = [FrameResult(row, "kitti") for row in rows[first:end]]
+    results = [FrameResult(row, KITTI) for row in rows[first:end]]
     return join_results(Span(FRAMES[first:end], first, known), results, rows_of)
 
 
