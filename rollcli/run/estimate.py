@@ -104,7 +104,7 @@ def _run_step(step: Step, plan: Plan, output: Output, progress: Progress, stop: 
                 add = output.replace if step.retries else output.append
                 add(positions, frames, batch)
                 progress.add_rows([frame.file for frame in frames], batch.figures, positions, batch.told)
-                if options.result.fail_fast and batch.figures.first_error >= 0:
+                if options.result.fail_fast and any(each.row.status == "error" for each in batch.told):
                     return False
     finally:
         output.commit()

@@ -47,11 +47,6 @@ class Figures(NamedTuple):
         numbers = array("d", (math.nan if value is None else value for value in values))
         return cls(bytes(STATUSES.index(row.status) for row in rows), numbers)
 
-    @property
-    def first_error(self) -> int:
-        """The position of the first row without an angle; -1 where there is none."""
-        return self.status.find(STATUSES.index("error"))
-
 
 class RunSummary:
     """Takes in the rows of a run, in any order.

@@ -147,15 +147,11 @@ class Source:
             )
         return self
 
-    @property
-    def doubt(self) -> str:
-        """All the doubts; empty when there is none."""
-        return "; ".join(filter(None, self.doubts.values()))
-
     def doubted(self, estimate: RollEstimate, likeness: str = "", note: str = "") -> RollEstimate:
         """Return an estimate whose message has all that the row says; it is suspect where the map is."""
-        said = filter(None, [likeness, estimate.message, self.doubt, self.note, note])
-        status = "suspect" if self.doubt else estimate.status
+        doubt = "; ".join(filter(None, self.doubts.values()))
+        said = filter(None, [likeness, estimate.message, doubt, self.note, note])
+        status = "suspect" if doubt else estimate.status
         return replace(estimate, status=status, message="; ".join(said))
 
     @contextlib.contextmanager
