@@ -1,4 +1,4 @@
-"""Assessments made by hand, whose numbers are chosen, and options of runs."""
+"""Assessments made by hand, whose numbers are chosen."""
 
 import numpy as np
 
@@ -6,7 +6,6 @@ from rollcli.rig.drive.assess import DriveAssessment, RigAssessment, RigFrames
 from rollcli.rig.drive.posterior import Estimate, Series
 from rollcli.rig.drive.quantity import Jump, Segment, SequenceAssessment
 from rollcli.rig.quantities import SIZE
-from rollcli.run import options
 
 UNKNOWN = Estimate()
 
@@ -68,11 +67,4 @@ def rig(*drives, changes=None, ok=None, suspect=None, include_suspect=False):
         sum(each.outliers for each in rolls),
         include_suspect,
         tuple(made),
-    )
-
-
-def options_of(*inputs, images=options.ImageOptions(), **result):  # noqa: B008 (it does not change)
-    """The options of a run over inputs, those of its result by name."""
-    return options.EstimateOptions(
-        inputs=options.InputOptions(inputs), images=images, result=options.ResultOptions(**result)
     )

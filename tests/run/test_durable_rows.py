@@ -10,13 +10,12 @@ import pytest
 from rollcli.files.results import STATUSES
 from rollcli.run.batch import Batch
 from rollcli.run.frame import Frame, ReadAs
-from rollcli.run.options import ImageOptions
+from rollcli.run.options import EstimateOptions, ImageOptions, ResultOptions
 from rollcli.run.plan import Plan
 from rollcli.run.progress import Figures
 from rollcli.run.result import FileOutput
 from rollcli.run.result_file import open_result
 from rollcli.run.resume import KeptRows, RunRecord
-from tests.run.rigs import options_of
 from tests.run_cli import contents, estimated, keep_rows, rollcli
 from tests.slow import mostly_slow
 
@@ -42,7 +41,8 @@ class WatchedFile:
 
 def plan_of(folder, count):
     """The plan of a run over so many maps, whose workers have written an image of each."""
-    options = options_of(images=ImageOptions(derotated=str(folder)), output=str(folder / "rolls.csv"))
+    images, result = ImageOptions(derotated=str(folder)), ResultOptions(str(folder / "rolls.csv"))
+    options = EstimateOptions(images=images, result=result)
     names = [f"{number}.png" for number in range(count)]
     for name in names:
         (folder / name).write_bytes(b"image")

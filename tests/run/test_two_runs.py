@@ -7,13 +7,12 @@ from rollcli.files.locking import locked_folder
 from rollcli.files.results import Row, read_result
 from rollcli.run.batch import BatchOptions, join_results
 from rollcli.run.frame import FrameResult
-from rollcli.run.options import EstimateOptions
+from rollcli.run.options import EstimateOptions, InputOptions, ResultOptions
 from rollcli.run.plan import make_plan
 from rollcli.run.progress import RunSummary
 from rollcli.run.result import open_output
 from rollcli.run.resume import RunRecord
 from rollcli.run.workers.chunks import Span
-from tests.run.rigs import options_of
 from tests.run_cli import contents, rollcli, write_maps
 
 ANOTHER = "another run has begun to write this result"
@@ -23,7 +22,11 @@ ANOTHER = "another run has begun to write this result"
 def plan(bucket, tmp_path):
     """The plan of a run over four maps on disk, in parts of two rows in the bucket."""
     write_maps(tmp_path / "maps", 4)
-    return make_plan(options_of(str(tmp_path / "maps"), output=f"{bucket}/rolls.csv", part_rows=2))
+    inputs, result = (
+        InputOptions((str(tmp_path / "maps"),)),
+        ResultOptions(f"{bucket}/rolls.csv", part_rows=2),
+    )
+    return make_plan(EstimateOptions(inputs=inputs, result=result))
 
 
 def append(output, frames, first=0):
