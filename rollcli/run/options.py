@@ -309,11 +309,6 @@ class RunningOptions(NamedTuple):
     quiet: bool = False
     verbose: bool = False
 
-    @property
-    def root(self) -> str:
-        """The folder where relative paths start, for workers on other machines; empty for this one."""
-        return str(Path.cwd()) if self.scheduler is not None else ""
-
     def note(self, *messages: str) -> None:
         """Write a line for each message to standard error, each once, unless quiet."""
         if not self.quiet:
@@ -434,7 +429,8 @@ class FramesOptions:
     def told(self: "Told") -> "Told":
         """What workers are told; of many inputs each gets its own alone."""
         stereo = replace(self.stereo, align=self.stereo.correction or self.stereo.align)
-        root, replaces = self.running.root, self.running.overwrite
+        root = "" if self.running.scheduler is None else str(Path.cwd())
+        replaces = self.running.overwrite
         return replace(self, inputs=InputOptions(), stereo=stereo, root=root, replaces=replaces)
 
     def at(self, path: str) -> str:

@@ -20,7 +20,7 @@ from rollcli.files import results
 from rollcli.files.atomic import is_file, is_folder, is_there, remove_leftovers
 from rollcli.files.locking import exists_already, locked_folder, not_resumable
 from rollcli.files.storage import is_stream, list_names, open_stream, read_bytes, remove, write_bytes
-from rollcli.files.stores.locations import base_name, is_url, located, public_name
+from rollcli.files.stores.locations import base_name, is_url, public_name
 from rollcli.run.batch import Batch, BatchOptions, Step
 from rollcli.run.frame import Frame
 from rollcli.run.options import EstimateOptions
@@ -141,10 +141,9 @@ class PartsOutput(Output):
     def __init__(self, record: RunRecord, kept: KeptRows) -> None:
         super().__init__(record, kept)
         self._part_rows = record.plan.options.result.part_rows
-        output = located(record.plan.options.running.root, record.plan.output)
         of_rows = {key: value for key, value in record.fixed.items() if key != "inputs"}
-        told = replace(record.plan.options, run=record.run)
-        self._rows = BatchOptions(told, self._plan.further, output, of_rows=of_rows)
+        told = replace(record.plan.options.told, run=record.run)
+        self._rows = BatchOptions(told, self._plan.further, told.at(self._plan.output), of_rows=of_rows)
         self._waiting: list[tuple[int, bytes, bytes]] = []  # positions, rows, and the lines of their inputs
         self._checked = time.monotonic()
 
