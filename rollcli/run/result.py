@@ -267,19 +267,19 @@ def _parsed(data: bytes, plan: Plan) -> tuple[KeptRows, bytes, bytes]:
         return kept, b"", b""
     update = plan.options.result.update
     inputs = Inputs(data_of(inputs_path(plan.output)), updates=update)
-    if update:
-        data, kept.gone = arranged(data, plan)
-    kept.take(results.parse_rows(data, plan.output), inputs)
+    try:
+        if update:
+            data, kept.gone = arranged(data, plan)
+        kept.take(results.parse_rows(data, plan.output), inputs)
+    except InputError as error:
+        raise not_resumable(plan.output, str(error)) from error
     lines = row_lines(io.BytesIO(data), plan.format)
     rows = b"".join(islice(lines, kept.count + (plan.format == "csv"))) if kept.count else b""
     return kept, rows, bytes(inputs.lines)
 
 
 def _begin(file: ResultFile, inputs: ResultFile, plan: Plan) -> FileOutput:
-    try:
-        kept, rows, lines = _parsed(file.read() if plan.options.result.resume else b"", plan)
-    except InputError as error:
-        raise not_resumable(plan.output, str(error)) from error
+    kept, rows, lines = _parsed(file.read() if plan.options.result.resume else b"", plan)
     record = new_record(plan, kept)
     remove_leftovers(chain(plan.files, map(os.path.realpath, plan.files)))
     # in this order, a run that is killed in between can be resumed: an empty file counts as a new one, and a
