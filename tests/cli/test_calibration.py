@@ -132,17 +132,3 @@ def test_the_horizon_is_marked_where_the_road_is_infinitely_far_away(tmp_path):
         told, quiet = (rollcli(*line, *flag, cwd=tmp_path).err for flag in ((), ("-q",)))
         assert ("images of about 601x381 px" in told, quiet) == (True, "")
     assert rollcli("estimate", *off[:3], "--principal-point", "400,220", cwd=tmp_path).status == 2  # outside
-
-
-def test_what_a_damaged_archive_lacks_is_not_said_of_the_maps_behind_it(maps):
-    (maps / "calib").mkdir()
-    for path in (maps / "maps").iterdir():
-        (maps / "calib" / f"{path.stem}.txt").write_text((maps / "calib.txt").read_text())
-    (maps / "a.tar").write_bytes(b"cut off" * 100)
-    inputs = ("a*.tar", "maps", "--calib", "calib")
-    rollcli("estimate", *inputs, "-o", "rolls.csv", cwd=maps, status=3)
-    done = rollcli("heights", *inputs, "--from", "rolls.csv", "-o", "heights", cwd=maps, status=3)
-    assert "was made with a calibration" not in done.err
-    for path in (maps / "calib").iterdir():
-        path.write_text("cam0=[200 0 9000; 0 200 60; 0 0 1]\nbaseline=500\n")
-    assert "lies outside of the" in rollcli("estimate", *inputs, cwd=maps).refused()

@@ -87,12 +87,3 @@ def test_transparent_pixels_of_a_mask_are_not_used(tmp_path, depth):
     cv2.imwrite(str(tmp_path / "mask.png"), np.dstack([np.full((*SHAPE, 3), 255, depth), shown]))
     found = region_mask(str(tmp_path / "mask.png"), FramesOptions(), SHAPE)
     np.testing.assert_array_equal(found, V > 60)
-
-
-def test_a_resume_says_that_the_mask_may_be_what_has_changed(tmp_path):
-    write_maps(tmp_path / "maps", 1)
-    line = ("estimate", "maps", "-o", "rolls.csv", "--mask", "mask.npy")
-    for rows, further, status in ((0, (), 0), (30, ("--resume",), 2)):
-        np.save(tmp_path / "mask.npy", rows <= V)
-        done = rollcli(*line, *further, cwd=tmp_path, status=status)
-    assert "maps/frame0.png or its mask has changed since" in done.err
