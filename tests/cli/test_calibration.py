@@ -127,8 +127,3 @@ def test_the_horizon_is_marked_where_the_road_is_infinitely_far_away(tmp_path):
     # the upright map is turned about its centre, and its horizon is level
     level = 99.5 - (99.5 - middle) * math.cos(roll)
     assert marked_row(tmp_path / "upright" / "a.png") == pytest.approx(level, abs=0.6)
-    off = ("maps", "--focal", "250", "--principal-point", "300,190", "--dry-run")  # as of larger images
-    for line in (("estimate", *off), ("vdisparity", *off, "-o", "v")):
-        told, quiet = (rollcli(*line, *flag, cwd=tmp_path).err for flag in ((), ("-q",)))
-        assert ("images of about 601x381 px" in told, quiet) == (True, "")
-    assert rollcli("estimate", *off[:3], "--principal-point", "400,220", cwd=tmp_path).status == 2  # outside
