@@ -102,19 +102,15 @@ class Number(ParamType):
         at_most: float = math.inf,
         auto: str | Literal[False] | None = False,
         whole: bool = False,
-        but: float | None = None,
+        but: float = math.nan,
     ) -> None:
         self.name, self.metavar, self.but = unit, unit if auto is False else f"{unit}|auto", but
         self.above, self.at_least, self.at_most = above, at_least, at_most
         self.auto, self.whole = auto, whole
-        bounds = [
-            f"above {above:g}" if above > -math.inf else "",
-            f"other than {but:g}" if but is not None else "",
-            f"of at least {at_least:g}" if at_least > -math.inf else "",
-            f"of at most {at_most:g}" if at_most < math.inf else "",
-        ]
-        words = "a whole number" if whole else "a number", " and ".join(filter(None, bounds))
-        self.what = " ".join(filter(None, [*words, "" if auto is False else "or auto"]))
+        bounds = {"above": above, "other than": but, "of at least": at_least, "of at most": at_most}
+        bounded = " and ".join(f"{word} {bound:g}" for word, bound in bounds.items() if math.isfinite(bound))
+        words = "a whole number" if whole else "a number", bounded, "" if auto is False else "or auto"
+        self.what = " ".join(filter(None, words))
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if self.auto is not False and value == "auto":
@@ -123,12 +119,8 @@ class Number(ParamType):
             number = int(value) if self.whole and not isinstance(value, float) else float(value)
         except (TypeError, ValueError, OverflowError):
             number = math.nan
-        fits = (
-            math.isfinite(number)
-            and number != self.but
-            and self.above < number
-            and self.at_least <= number <= self.at_most
-        )
+        within = self.above < number and self.at_least <= number <= self.at_most
+        fits = within and math.isfinite(number) and number != self.but
         if not fits or isinstance(value, bool) or (self.whole and number != int(number)):
             self.fail(f"{value!r} is not {self.what}", param, ctx)
         return int(number) if self.whole else number
