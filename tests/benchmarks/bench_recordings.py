@@ -84,7 +84,7 @@ def by_library(path: Path) -> int:
 def by_rollcli(path: Path) -> int:
     """Find the frames of a bag, and read each."""
     bags._opened.cache_clear()
-    found = of_bags.maps_of_bag([str(path)], str(path), "/maps")
+    found = of_bags.frames_of_bag([str(path)], str(path), "/maps", None, None, 0.0)
     return sum(read_stored(each.location, each.name).values.shape[0] for each, _ in found.frames)
 
 

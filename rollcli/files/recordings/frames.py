@@ -60,20 +60,7 @@ class _Found:
 def frames_of_bag(
     files: Sequence[str], name: str, topic: str | None, left: str | None, right: str | None, tolerance: float
 ) -> BagFrames:
-    """Find the pairs of two topics, whose stamps differ by so many ms at most; without these, the maps.
-
-    Raises
-    ------
-    UsageError
-        See `pairs_of_bag` and `maps_of_bag`.
-    """
-    if left is not None and right is not None:
-        return pairs_of_bag(files, name, left, right, round(tolerance * 1e6))
-    return maps_of_bag(files, name, topic)
-
-
-def maps_of_bag(files: Sequence[str], name: str, topic: str | None) -> BagFrames:
-    """Find the disparity or depth maps of a bag.
+    """Find the maps of a bag, or pair the views of two topics.
 
     Parameters
     ----------
@@ -82,54 +69,65 @@ def maps_of_bag(files: Sequence[str], name: str, topic: str | None) -> BagFrames
     name : str
         What errors call it.
     topic : str or None
-        The topic; None: the only one that fits.
+        That of maps; None: the only one that fits.
+    left, right : str or None
+        Those of views, in place of maps.
+    tolerance : float
+        By how many ms the header stamps of a pair may differ.
 
     Raises
     ------
     UsageError
-        There is no such topic, or none or several that fit.
+        There is no such topic, none or several that fit, nothing in them, or no pair.
     """
     topics = _topics(files)
-    chosen = topic or _only_map_topic(files, topics, name)
-    found = _scan(files, [_known(topics, chosen, name)], topics)
-    has_doffs = topics[chosen].type == DISPARITY
-    bag = BagFrames([(each, None) for each in found.frames[chosen]])
-    left, right = _cameras(found, chosen)
-    stated = 0.0
-    for each in found.frames[chosen] if has_doffs else ():
-        with contextlib.suppress(InputError):  # a damaged one says so in its row
-            stated = messages.baseline_of(topics[chosen], _message(each.location))
-            break
-    if stated < 0 and right is None:
-        bag.notes.append(f"{name}: {chosen} states a baseline T of {stated:g} m: taken as {-stated:g} m")
-    _calibrate(bag, left, right, abs(stated), name)
-    if bag.calibration is not None and has_doffs:
-        bag.calibration = replace(bag.calibration, doffs=0.0)
-    if bag.calibration is None and (found.cameras or has_doffs):
-        lacks = _NO_LEFT if any(each.usable for each in found.cameras.values()) else _NO_P
-        bag.uncalibrated.append(f"{name}: {lacks}")
-    _finish(bag, found, name, chosen)
+    views = () if left is None or right is None else (left, right)
+    chosen = views or (topic or _only_map_topic(files, topics, name),)
+    found = _scan(files, [_known(topics, each, name) for each in chosen], topics)
+    bag = BagFrames()
+    if views:
+        _add_pairs(bag, found, files, name, *views, round(tolerance * 1e6))
+    else:
+        _add_maps(bag, found, topics[chosen[0]], name)
+    if not bag.frames and not found.broken:
+        raise UsageError(f"{name}: has no messages of {' and '.join(chosen)}")
+    of_pairs = bool(views and bag.frames)
+    for path, stem in found.broken:  # one frame more, which fails and says so
+        rest = Input(f"{path}#rest", f"{path}#rest".replace(os.sep, "/"), f"{stem}_rest.npy")
+        bag.frames.append((rest, rest if of_pairs else None))
     return bag
 
 
-def pairs_of_bag(files: Sequence[str], name: str, left: str, right: str, tolerance_ns: int) -> BagFrames:
-    """Pair the views of two topics by their header stamps, each with the nearest one within a tolerance.
+def _add_maps(bag: BagFrames, found: _Found, topic: Topic, name: str) -> None:
+    """Add the disparity or depth maps of a topic, and the calibration of its cameras."""
+    frames, has_doffs = found.frames[topic.name], topic.type == DISPARITY
+    bag.frames = [(each, None) for each in frames]
+    left, right = _cameras(found, topic.name)
+    stated = 0.0
+    for each in frames if has_doffs else ():
+        with contextlib.suppress(InputError):  # a damaged one says so in its row
+            data = opened(each.location.partition("#")[0]).read(split_position(each.location)[1]).data
+            stated = messages.baseline_of(topic, data)
+            break
+    if stated < 0 and right is None:
+        bag.notes.append(f"{name}: {topic.name} states a baseline T of {stated:g} m: taken as {-stated:g} m")
+    _calibrate(bag, left, right, abs(stated), name)
+    if bag.calibration is None and (found.cameras or has_doffs):
+        lacks = _NO_LEFT if any(each.usable for each in found.cameras.values()) else _NO_P
+        bag.uncalibrated.append(f"{name}: {lacks}")
+    elif bag.calibration is not None and has_doffs:
+        bag.calibration = replace(bag.calibration, doffs=0.0)
 
-    Raises
-    ------
-    UsageError
-        There is no such topic, or no pair.
-    """
-    topics = _topics(files)
-    found = _scan(files, [_known(topics, each, name) for each in (left, right)], topics)
-    lefts, rights = found.frames[left], found.frames[right]
-    bag = BagFrames()
-    pairs = nearest([each.stamp for each in lefts], [each.stamp for each in rights], tolerance_ns)
+
+def _add_pairs(
+    bag: BagFrames, found: _Found, files: Sequence[str], name: str, left: str, right: str, tolerance_ns: int
+) -> None:
+    """Pair the views of two topics by their header stamps, each with the nearest one within a tolerance."""
     for topic in (left, right):
         info, is_raw = found.cameras.get(_beside(topic)), _RAW in topic
         if is_raw and info is not None and info.changes_raw_views:
             bag.notes.append(f"{topic}: raw views are rectified by D, K, R and P of {_beside(topic)}")
-            found.frames[topic][:] = [_rectified(found, topic, each) for each in found.frames[topic]]
+            found.frames[topic] = [_rectified(found, topic, each) for each in found.frames[topic]]
             bag.notes += [
                 f"{path}: has no {_beside(topic)}: its raw views are taken as they are"
                 for path in files
@@ -137,23 +135,19 @@ def pairs_of_bag(files: Sequence[str], name: str, left: str, right: str, toleran
             ]
         elif is_raw and not (info is not None and info.usable):
             bag.notes.append(f"{topic}: raw views are taken as they are: no CameraInfo with P rectifies them")
+    lefts, rights = found.frames[left], found.frames[right]
+    pairs = nearest([each.stamp for each in lefts], [each.stamp for each in rights], tolerance_ns)
     bag.frames = [(lefts[one], rights[other]) for one, other in pairs.items()]
+    within = f"within {tolerance_ns / 1e6:g} ms"
+    if not pairs and (lefts or rights):
+        raise UsageError(f"{name}: no views of {left} and {right} are {within}: --sync-tolerance")
     for side, views, paired in (("left", lefts, {*pairs}), ("right", rights, {*pairs.values()})):
         if alone := [f"@{each.stamp}" for at, each in enumerate(views) if at not in paired]:
-            bag.notes.append(
-                f"{name}: {len(alone)} {side} views have no partner within {tolerance_ns / 1e6:g} ms and "
-                f"are left out: {listed(alone)}"
-            )
-    if not bag.frames and (lefts or rights):
-        raise UsageError(
-            f"{name}: no views of {left} and {right} are within {tolerance_ns / 1e6:g} ms: --sync-tolerance"
-        )
-    one, other = (found.cameras.get(_beside(topic)) for topic in (left, right))
-    _calibrate(bag, one, other, 0.0, name)
+            without = f"{len(alone)} {side} views have no partner {within}"
+            bag.notes.append(f"{name}: {without} and are left out: {listed(alone)}")
+    _calibrate(bag, found.cameras.get(_beside(left)), found.cameras.get(_beside(right)), 0.0, name)
     if bag.calibration is None and found.cameras:
         bag.uncalibrated.append(f"{name}: {_beside(left)} is {_NO_P}")
-    _finish(bag, found, name, f"{left} and {right}")
-    return bag
 
 
 def is_disparity_image(path: str, member: str) -> bool:
@@ -164,24 +158,23 @@ def is_disparity_image(path: str, member: str) -> bool:
 
 
 def nearest(lefts: Sequence[int], rights: Sequence[int], tolerance: int) -> dict[int, int]:
-    """Find the left and right stamps that are each other's nearest.
+    """Find the left and right stamps, each in ascending order, that are each other's nearest.
 
     Returns
     -------
     dict of int to int
         By the position of each left stamp that of the right one, if there is one within the tolerance.
     """
-    left_order, right_order = (sorted(range(len(each)), key=each.__getitem__) for each in (lefts, rights))
 
-    def closest(stamp: int, order: Sequence[int], stamps: Sequence[int]) -> int | None:
-        at = bisect_left(order, stamp, key=stamps.__getitem__)
-        around = [each for each in order[max(at - 1, 0) : at + 1] if abs(stamps[each] - stamp) <= tolerance]
-        return min(around, key=lambda each: abs(stamps[each] - stamp), default=None)
+    def closest(stamp: int, stamps: Sequence[int]) -> int | None:
+        at = bisect_left(stamps, stamp)
+        off = {each: abs(stamps[each] - stamp) for each in range(max(at - 1, 0), min(at + 1, len(stamps)))}
+        return min((each for each in off if off[each] <= tolerance), key=off.__getitem__, default=None)
 
     pairs = dict[int, int]()
     for place, stamp in enumerate(lefts):
-        right = closest(stamp, right_order, rights)
-        if right is not None and closest(rights[right], left_order, lefts) == place:
+        right = closest(stamp, rights)
+        if right is not None and closest(rights[right], lefts) == place:
             pairs[place] = right
     return pairs
 
@@ -326,15 +319,6 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
     return _Found(frames, cameras, places, broken)
 
 
-def _finish(bag: BagFrames, found: _Found, name: str, topic: str) -> None:
-    """Add a frame for what is broken, which fails and says so; refuse a bag without any."""
-    if not bag.frames and not found.broken:
-        raise UsageError(f"{name}: has no messages of {topic}")
-    for path, stem in found.broken:
-        rest = Input(f"{path}#rest", f"{path}#rest".replace(os.sep, "/"), f"{stem}_rest.npy")
-        bag.frames.append((rest, None if not bag.frames or bag.frames[0][1] is None else rest))
-
-
 def _beside(topic: str) -> str:
     """Name the CameraInfo of an image topic: it lies in the same namespace.
 
@@ -381,7 +365,3 @@ def _rectified(found: _Found, topic: str, frame: Input) -> Input:
     """Add to a frame's location where its CameraInfo is; a file of a split bag without one stays as it is."""
     place = found.places.get((frame.location.partition("#")[0], _beside(topic)))
     return frame if place is None else replace(frame, location=f"{frame.location}+{place}")
-
-
-def _message(location: str) -> memoryview:
-    return opened(location.partition("#")[0]).read(split_position(location)[1]).data
