@@ -1,6 +1,5 @@
 """Read and write the rows of a result: CSV, JSON Lines, Parquet (extra `parquet`), and folders of parts."""
 
-import contextlib
 import csv
 import io
 import json
@@ -57,9 +56,8 @@ def encode_parquet(
 
     columns = [(name, _ARROW_TYPES[kind]) for name, kind in types.items()]
     schema = pyarrow.schema(columns, metadata={_RECORD: json.dumps(record).encode()})
-    with _of_utf8():
-        table = pyarrow.Table.from_pylist(list(rows), schema=schema)
-    target = io.BytesIO()
+    require_utf8(value for row in rows for value in row.values() if isinstance(value, str))
+    table, target = pyarrow.Table.from_pylist(list(rows), schema=schema), io.BytesIO()
     pyarrow.parquet.write_table(table, target, compression="zstd", version="2.6", write_page_checksum=True)
     return target.getvalue()
 
@@ -72,18 +70,12 @@ def require_utf8(texts: Iterable[str]) -> None:
     UsageError
         A text is not UTF-8, as a file name need not be.
     """
-    with _of_utf8():
-        for text in texts:
+    for text in texts:
+        try:
             text.encode()
-
-
-@contextlib.contextmanager
-def _of_utf8() -> Iterator[None]:
-    try:
-        yield
-    except UnicodeEncodeError as error:
-        name = error.object.encode("utf-8", "backslashreplace").decode()
-        raise UsageError(f"{name}: this name is not UTF-8, which Parquet cannot hold; use CSV") from error
+        except UnicodeEncodeError as error:
+            name = text.encode("utf-8", "backslashreplace").decode()
+            raise UsageError(f"{name}: this name is not UTF-8, which Parquet cannot hold; use CSV") from error
 
 
 def decode_parquet(data: bytes) -> Iterator[tuple[int, dict[str, Any]]]:
