@@ -10,7 +10,7 @@ from pathlib import PureWindowsPath
 import pytest
 
 from rollcli import errors
-from rollcli.files import inputs
+from rollcli.files import naming
 from rollcli.files.stores.locations import is_url, public_name
 from tests.run_cli import contents, keep_rows, python, rollcli, write_maps
 from tests.slow import mostly_slow
@@ -68,8 +68,8 @@ def test_a_drive_letter_is_no_scheme(path):
 
 
 def test_rows_name_files_with_slashes_where_the_system_has_backslashes(monkeypatch):
-    monkeypatch.setattr(inputs.os, "sep", "\\")
-    assert inputs._shown(str(PureWindowsPath("C:/maps/run7/a.png"))) == "C:/maps/run7/a.png"
+    monkeypatch.setattr(naming.os, "sep", "\\")
+    assert naming.Input(str(PureWindowsPath("C:/maps/run7/a.png")), "a.png").name == "C:/maps/run7/a.png"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows takes no such path unless long paths are on")

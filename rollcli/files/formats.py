@@ -98,7 +98,7 @@ def decode_stored(data: bytes, name: str) -> Stored:
         Not such a file, truncated, damaged, not single-channel, or with no real numbers.
     """
     with about(name):
-        stored = _decoded(data)
+        stored = _format_of(data).decode(data)
         if stored.values.dtype.kind == "b":
             raise InputError("holds true and false: that is a mask, not a disparity map")
     return replace(stored, note=stored.note and f"{name} {stored.note}")
@@ -180,7 +180,7 @@ def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:
         elif data.startswith(pictures.SIGNATURES):
             raise InputError("is a JPEG, whose black is not all 0: save the mask as PNG")
         else:
-            pixels = _decoded(data).values
+            pixels = _format_of(data).decode(data).values
     return usable_of(pixels if pixels.ndim == 2 else pixels.max(axis=2))
 
 
@@ -191,13 +191,14 @@ def _check_beginning(head: bytes, size: int, name: str) -> None:
             arrays.check_npy(head, size)
         elif head.startswith(arrays.MAGICS):
             arrays.check_pfm(head, size)
-        elif not any(head.startswith(each.signatures) for each in MAP_FORMATS.values()):
-            _decoded(head)  # which says what it is instead
+        else:
+            _format_of(head)
 
 
-def _decoded(data: bytes) -> Stored:
+def _format_of(data: bytes) -> MapFormat:
+    """Return the format of a map file by its first bytes; refuse what is none."""
     for each in MAP_FORMATS.values():
         if data.startswith(each.signatures):
-            return each.decode(data)
+            return each
     hint = "; photographs are given by --left and --right" if data.startswith(pictures.SIGNATURES) else ""
     raise InputError(f"is no PNG, TIFF, NPY, NPZ, PFM or EXR file, as disparity maps are{hint}")

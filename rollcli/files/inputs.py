@@ -16,7 +16,7 @@ from rollcli.files.containers import file_of, frame_name, shown
 from rollcli.files.naming import Input, listed, match_names, natural_key
 from rollcli.files.search import IMAGE_ENDINGS, LEAVE_NONE, MAP_ENDINGS, Search
 from rollcli.files.storage import STREAM, read_named
-from rollcli.files.stores.locations import base_name, is_url, public_name
+from rollcli.files.stores.locations import base_name, is_url
 
 _NO_TEXT = (  # what images and archives begin with
     *(b"\x89PNG", b"II*\0", b"MM\0*", b"\x93NUMPY", b"Pf\n", b"PF\n"),
@@ -66,7 +66,7 @@ def find_inputs(
             repeats |= place in seen
             if place not in seen:
                 seen.add(place)
-                found.append(Input(path, _shown(path), relative))
+                found.append(Input(path, relative))
         if repeats and len(found) == before and not literal:
             search.notes.append(f"{argument}: is named more than once; each of its files is taken once")
     if search.left_out:
@@ -85,12 +85,7 @@ def find_inputs(
 
 def named_input(location: str) -> Input:
     """Make the input of a file that was named by itself."""
-    return Input(location, _shown(location), base_name(location) if is_url(location) else Path(location).name)
-
-
-def _shown(location: str) -> str:
-    """Return a location as rows show it; on Linux that is the same text, which takes no further memory."""
-    return public_name(location) if is_url(location) else shown(location).replace(os.sep, "/")
+    return Input(location, base_name(location) if is_url(location) else Path(location).name)
 
 
 def pair_inputs(

@@ -1,10 +1,13 @@
 """Inputs and their names: the natural order of these, and which left image belongs to which right one."""
 
+import os
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TypeVar
+
+from rollcli.files.stores.locations import is_url, public_name
 
 Key = TypeVar("Key")
 Value = TypeVar("Value")
@@ -31,8 +34,6 @@ class Input:
     ----------
     location : str
         Where it is.
-    name : str
-        As the user named it, with "/" separators: what a result's column `file` says.
     relative : str
         Its path below the folder or pattern it was found in: where outputs keep it.
     stamp : int
@@ -40,9 +41,15 @@ class Input:
     """
 
     location: str
-    name: str
     relative: str
     stamp: int = 0
+
+    @property
+    def name(self) -> str:
+        """As the user named it, with "/" separators: what a result's column `file` says."""
+        if is_url(self.location):
+            return public_name(self.location)
+        return split_position(self.location)[0].replace(os.sep, "/")
 
 
 def split_position(location: str) -> tuple[str, tuple[int, ...]]:

@@ -120,7 +120,7 @@ def read_frame(
     elif is_url(location):
         data, state = objects.read_object(location, most)  # the tag is noted
     else:
-        inside = read_member(location, name, most) if "#" in location else None
+        inside = read_member(location, name, most)
         data = inside if inside is not None else _read_file(location, name, most, begins)
     if len(data) == 0:
         raise InputError(f"{name}: is empty")

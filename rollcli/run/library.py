@@ -334,5 +334,5 @@ def _of_videos(name: str, right: str | None, layout: str | None) -> Sequence[tup
         )
     from rollcli.files.recordings.video import frames_of
 
-    left, other = (Input(each, each, each) for each in (name, right or name))
+    left, other = (Input(each, each) for each in (name, right or name))
     return frames_of(left, other, layout)

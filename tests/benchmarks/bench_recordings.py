@@ -100,7 +100,7 @@ def frames_of_video(path: Path) -> int:
     """Count the frames of a video, and read each."""
     for cached in (video._look_through, video._decoder):
         cached.cache_clear()
-    source = Input(str(path), str(path), path.name)
+    source = Input(str(path), path.name)
     found = video.frames_of(source, source, "left-right")
     return sum(1 for each, _ in found if read_image(each.location, each.name).size)
 

@@ -93,7 +93,7 @@ def frames_of_bag(
         raise UsageError(f"{name}: has no messages of {' and '.join(chosen)}")
     of_pairs = bool(views and bag.frames)
     for path, stem in found.broken:  # one frame more, which fails and says so
-        rest = Input(f"{path}#rest", f"{path}#rest".replace(os.sep, "/"), f"{stem}_rest.npy")
+        rest = Input(f"{path}#rest", f"{stem}_rest.npy")
         bag.frames.append((rest, rest if of_pairs else None))
     return bag
 
@@ -310,8 +310,7 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
                     endings[topic.name] = messages.ending_of(topic, bag.read(message.place).data)
             ending = endings.get(topic.name, ".npy")
             relative = f"{stem}_{stamp}{again.replace('.', '_')}{ending}"
-            shown = f"{name}{again}".replace(os.sep, "/")
-            frames[topic.name].append(Input(f"{name}{again}#@{place}", shown, relative, stamp))
+            frames[topic.name].append(Input(f"{name}{again}#@{place}", relative, stamp))
         if bag.broken:
             broken.append((path, stem))
     for each in frames.values():  # a recorder writes messages as they come in

@@ -105,9 +105,9 @@ def frames_of(left: Input, right: Input, layout: str | None) -> list[tuple[Input
 
 
 def _listed(video: Video, source: Input) -> list[Input]:
-    path, name, stem = source.location, source.name, os.path.splitext(source.relative)[0]  # noqa: PTH122
+    path, stem = source.location, os.path.splitext(source.relative)[0]  # noqa: PTH122
     numbers = [f"{number:06d}" for number in range(video.frames)] + (["rest"] if video.broken else [])
-    return [Input(f"{path}#{each}", f"{name}#{each}", f"{stem}_{each}.png") for each in numbers]
+    return [Input(f"{path}#{each}", f"{stem}_{each}.png") for each in numbers]
 
 
 def read_video_frame(path: str, frame: str, name: str) -> NDArray[Any]:
