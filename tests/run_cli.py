@@ -240,8 +240,8 @@ def estimated(
     return folder
 
 
-def write_pair(folder: Path, name: str, disparity, seed: int = 0) -> None:
-    """A textured stereo pair with this disparity (px), as folder/left/name and folder/right/name."""
+def write_pair(folder: Path, name: str, disparity, seed: int = 0):
+    """A textured stereo pair with this disparity (px), folder/left/name and folder/right/name; its views."""
     height, width = disparity.shape
     texture = np.random.default_rng(seed).uniform(0, 255, (height, width + 64)).astype(np.float32)
     texture = cv2.GaussianBlur(texture, (0, 0), 1.0)
@@ -252,7 +252,9 @@ def write_pair(folder: Path, name: str, disparity, seed: int = 0) -> None:
         np.take_along_axis(texture, np.where(each < 0, -1 - each, each), 1) for each in (first, first + 1)
     )
     seen = one + (at - first) * (other - one)
-    write_views(folder, name, seen.astype(np.uint8), texture[:, 32 : 32 + width].astype(np.uint8))
+    views = seen.astype(np.uint8), texture[:, 32 : 32 + width].astype(np.uint8)
+    write_views(folder, name, *views)
+    return views
 
 
 def write_views(folder: Path, name: str, *views) -> None:

@@ -3,7 +3,6 @@
 import contextlib
 import sqlite3
 
-import cv2
 import pytest
 
 from tests.files.recordings.bag_files import camera_info, compressed, image, write_bag
@@ -12,14 +11,8 @@ from tests.files.recordings.test_bags import START, STEP, P, drive, maps, rows
 from tests.run_cli import rollcli, write_pair
 
 
-@pytest.fixture
-def views(tmp_path):
-    write_pair(tmp_path, "0.png", maps(1)[0])
-    return [cv2.imread(str(tmp_path / side / "0.png"), 0) for side in ("left", "right")]
-
-
-def test_sizes_that_change_within_a_drive_are_told(tmp_path, views):
-    left, right = views
+def test_sizes_that_change_within_a_drive_are_told(tmp_path):
+    left, right = write_pair(tmp_path, "0.png", maps(1)[0])
 
     def make(store):
         for place, (one, other) in enumerate([(left, right), (left, right[:-2]), (left[:-20], right[:-20])]):

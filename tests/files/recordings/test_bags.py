@@ -92,17 +92,14 @@ def test_disparity_images_give_the_rows_of_the_same_maps_in_files(tmp_path, kind
 
 @pytest.mark.parametrize("kind", mostly_slow(KINDS, "mcap"))
 def test_views_are_paired_by_their_stamps_never_by_order(tmp_path, kind):
-    for number in range(4):
+    views = [
         write_pair(tmp_path / "pairs", f"{number}.png", road_map(math.radians(number)), seed=number)
-    views = {
-        side: [cv2.imread(str(tmp_path / "pairs" / side / f"{each}.png"), 0) for each in range(4)]
-        for side in ("left", "right")
-    }
+        for number in range(4)
+    ]
 
     def make(store):
-        for number in range(4):
+        for number, (left, right) in enumerate(views):
             stamp = START + number * STEP
-            left, right = views["left"][number], views["right"][number]
             yield "/l/image_rect", stamp, image(store, left, "mono8", stamp, number, padding=5)
             if number != 1:  # dropped
                 late = stamp + 15_000  # as OAK's cameras
@@ -130,9 +127,8 @@ def test_views_are_paired_by_their_stamps_never_by_order(tmp_path, kind):
 
 @pytest.mark.parametrize("transport", ["", "/compressed"])
 def test_raw_views_are_rectified_and_a_line_says_so(tmp_path, transport):
-    write_pair(tmp_path / "pairs", "0.png", road_map(math.radians(3)))
-    views = {side: cv2.imread(str(tmp_path / "pairs" / side / "0.png"), 0) for side in ("left", "right")}
-    height, width = views["left"].shape
+    pair = write_pair(tmp_path / "pairs", "0.png", road_map(math.radians(3)))
+    height, width = pair[0].shape
     k = np.array([[350.0, 0, 80], [0, 350, 60], [0, 0, 1]])
     d = np.array([-0.2, 0.05, 0.001, -0.001, 0.0])
     # the raw view by its definition: each of its pixels shows what lies at its undistorted place
@@ -140,7 +136,7 @@ def test_raw_views_are_rectified_and_a_line_says_so(tmp_path, transport):
     places = cv2.undistortPoints(np.dstack([u, v]).reshape(-1, 1, 2), k, d, P=k).reshape(height, width, 2)
     raw = {
         side: cv2.remap(each, places.astype(np.float32), None, cv2.INTER_CUBIC)
-        for side, each in views.items()
+        for side, each in zip(("left", "right"), pair, strict=True)
     }
 
     def make(store):

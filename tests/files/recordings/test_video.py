@@ -48,13 +48,10 @@ def packets_of(path):
 def drive(tmp_path_factory):
     """A folder with left/ and right/, the rows of these pairs, and the views."""
     folder = tmp_path_factory.mktemp("drive")
-    for number in range(COUNT):
-        write_pair(folder, f"{number}.png", road_map(math.radians(number - 2)), seed=number)
+    rolls = [math.radians(number - 2) for number in range(COUNT)]
+    pairs = [write_pair(folder, f"{at}.png", road_map(roll), seed=at) for at, roll in enumerate(rolls)]
+    views = [[cv2.cvtColor(each, cv2.COLOR_GRAY2BGR) for each in pair] for pair in pairs]
     done = rollcli("estimate", "--left", "left", "--right", "right", cwd=folder, status=0)
-    views = [
-        [cv2.imread(str(folder / side / f"{each}.png")) for side in ("left", "right")]
-        for each in range(COUNT)
-    ]
     return folder, rows(done.out), views
 
 
@@ -132,11 +129,10 @@ def test_images_side_by_side_give_the_same_rows_as_their_halves(tmp_path, drive,
 
 @pytest.mark.slow
 def test_the_correction_of_views_side_by_side_is_that_of_their_files(tmp_path):
-    for number in range(8):
-        write_pair(tmp_path, f"{number}.png", road_map(0.01 * number, width=320, height=200), seed=number)
     (tmp_path / "both").mkdir()
     for number in range(8):
-        views = [cv2.imread(str(tmp_path / side / f"{number}.png")) for side in ("left", "right")]
+        disparity = road_map(0.01 * number, width=320, height=200)
+        views = write_pair(tmp_path, f"{number}.png", disparity, seed=number)
         cv2.imwrite(str(tmp_path / "both" / f"{number}.png"), np.hstack(views))
     for name, given in {"a": ["--left", "left", "--right", "right"], "b": ["both", "--side-by-side"]}.items():
         assert rollcli("estimate", *given, "-o", f"{name}.csv", cwd=tmp_path).status == 0
