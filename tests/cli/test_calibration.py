@@ -26,7 +26,7 @@ POSE = ("pitch_deg", "pitch_ci95_deg", "height_m", "height_ci95_m")
 def maps(tmp_path):
     for stem in ("000000_10", "000001_10"):
         write_kitti(tmp_path / "maps" / f"{stem}.png", cast(CALIBRATION, ROLL, PITCH, HEIGHT))
-    (tmp_path / "calib.txt").write_text(samples.kitti_raw(RIG))
+    (tmp_path / "calib.txt").write_text(samples.written("kitti-raw", RIG))
     return tmp_path
 
 
@@ -117,7 +117,7 @@ def marked_row(path):
 def test_the_horizon_is_marked_where_the_road_is_infinitely_far_away(tmp_path):
     roll = math.radians(9)
     write_kitti(tmp_path / "maps" / "a.png", cast(CALIBRATION, roll, PITCH, HEIGHT))
-    (tmp_path / "calib.txt").write_text(samples.kitti_raw(RIG))
+    (tmp_path / "calib.txt").write_text(samples.written("kitti-raw", RIG))
     maps = ("maps", "--calib", "calib.txt")
     assert rollcli("estimate", *maps, "--vdisparity", "upright", cwd=tmp_path).status == 0
     done = rollcli("vdisparity", *maps, "-o", "as_it_is", cwd=tmp_path)

@@ -21,7 +21,7 @@ from rollcli.files.stores.locations import (
     split_url,
     store_of,
 )
-from tests.rig.calibration_files import KALIBR, WHOLE, Rig, zed
+from tests.rig.calibration_files import KALIBR, WHOLE, Rig, written
 from tests.run_cli import road_map, rollcli, write_maps
 
 MAPS, RESULT, RECORD, INPUTS = "maps", "rolls.csv", "rolls.csv.run.json", "rolls.csv.inputs"
@@ -74,8 +74,8 @@ def _whole() -> dict[str, bytes]:
         "settings/utf-16": _SAMPLES["settings"].encode("utf-16"),
         "urls/txt": _SAMPLES["urls"].encode(),
         "calibrations/unrectified-kalibr": KALIBR.encode(),
-        "calibrations/unrectified-zed": zed(_RIG).encode(),
-        **{f"calibrations/{form}": write(_RIG).encode() for form, write in WHOLE.items()},
+        "calibrations/unrectified-zed": written("zed", _RIG).encode(),
+        **{f"calibrations/{form}": written(form, _RIG).encode() for form in WHOLE},
     }
 
 

@@ -1,6 +1,5 @@
 """The same rig written in every format, by hand, and samples of real files, from `samples`."""
 
-from functools import partial
 from pathlib import Path
 from string import Template
 from typing import NamedTuple
@@ -36,20 +35,10 @@ def ros(rig, *, right, positive=False):
     return written("ros", rig, side_shift=shift, **side)
 
 
-kitti_raw = partial(written, "kitti-raw")
-kitti_benchmark = partial(written, "kitti-benchmark")
-driving_stereo = partial(written, "driving-stereo")
-middlebury = partial(written, "middlebury")
-opencv_yaml = partial(written, "opencv-yaml")
-orb_slam = partial(written, "orb-slam")
-cityscapes = partial(written, "cityscapes")
-kalibr = partial(written, "kalibr")
-zed = partial(written, "zed")
-
-WHOLE = {
-    each.args[0]: each
-    for each in (kitti_benchmark, kitti_raw, driving_stereo, middlebury, opencv_yaml, orb_slam, cityscapes)
-}
+WHOLE = (
+    *("kitti-benchmark", "kitti-raw", "driving-stereo", "middlebury"),
+    *("opencv-yaml", "orb-slam", "cityscapes"),
+)
 WITH_SIZE = ("kitti-raw", "driving-stereo", "middlebury", "orb-slam")
 WITHOUT_DOFFS = ("orb-slam", "cityscapes")
 

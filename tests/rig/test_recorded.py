@@ -145,19 +145,19 @@ def _read(*texts, **given):
 
 
 RIG = files.Rig(doffs=3.25)
+GREY = files.written("kitti-benchmark", RIG)
 FILES = {
-    **{name: [make(RIG)] for name, make in files.WHOLE.items()},
+    **{name: [files.written(name, RIG)] for name in (*files.WHOLE, "kalibr", "zed")},
     "ros": [files.ros(RIG, right=False), files.ros(RIG, right=True)],
     "ros alone": [files.ros(RIG, right=True)],
     "ros swapped": [files.ros(RIG, right=True), files.ros(RIG, right=False)],
     "ros positive": [files.ros(RIG, right=False), files.ros(RIG, right=True, positive=True)],
-    "kalibr": [files.kalibr(RIG)],
-    "zed": [files.zed(RIG)],
     "real kitti raw": [files.KITTI_RAW],
     "real middlebury": [files.MIDDLEBURY],
     "real opencv": [files.OPENCV],
     "real kitti object": [files.KITTI_OBJECT],
-    "four cameras": [files.kitti_benchmark(RIG) + files.KITTI_OBJECT],
+    "four cameras": [GREY + files.KITTI_OBJECT],
+    "four cameras of one baseline": [GREY + GREY.replace("P0:", "P2:").replace("P1:", "P3:")],
     "real ros": [files.ROS_LEFT, files.ROS_RIGHT],
     "real ros alone": [files.ROS_LEFT],
     "real kalibr": [files.KALIBR],
@@ -189,17 +189,17 @@ def _changed(line):
 
 
 ROS = files.ros(PLAIN, right=False)
-CLOSE = files.opencv_yaml(PLAIN._replace(baseline=-0.5))
+CLOSE = files.written("opencv-yaml", PLAIN._replace(baseline=-0.5))
 DAMAGED = (
     *_texts("calibration"),
     *map(_changed, _texts("changed")),
     *(text[:-60] for text in (files.KITTI_RAW, files.KALIBR)),
     files.MIDDLEBURY[:30],
     files.OPENCV[:-30],
-    files.cityscapes(PLAIN)[:-5],
+    files.written("cityscapes", PLAIN)[:-5],
     files.KITTI_RAW.replace("-3.875744e+02", "9" * 5000),
     files.KITTI_RAW.splitlines()[1],
-    files.zed(PLAIN).partition("Baseline")[0],
+    files.written("zed", PLAIN).partition("Baseline")[0],
     *(files.ROS_RIGHT, files.ROS_LEFT, CLOSE, CLOSE.partition("Q:")[0]),
     *(ROS.replace("[707.0912", "[0.0"), ROS.replace("width: 1226", "width: 12.5")),
     "left:\n" + ROS.replace("\n", "\n  ").join(("  ", "")),
