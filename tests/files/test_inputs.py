@@ -32,11 +32,14 @@ def names(found):
     return [each.name for each in found]
 
 
-def test_stdin_is_read_when_no_lines_are_given(here, monkeypatch):
+def test_stdin_is_read_and_a_closed_one_is_named(here, monkeypatch):
     here("ä.png")
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO("ä.png\n".encode())))
 
     assert names(find_inputs(["-"])) == ["ä.png"]
+    monkeypatch.setattr(sys, "stdin", None)
+    with pytest.raises(UsageError, match="stdin is closed"):
+        find_inputs(["-"])
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have no names that are no text")
@@ -56,14 +59,6 @@ def test_pipes_and_folders_with_readable_endings_are_no_files(here):
     os.mkfifo(root / "maps" / "pipe.png")
 
     assert names(find_inputs(["maps"])) == ["maps/f1.png"]
-
-
-def test_a_closed_stdin_is_named(here, monkeypatch):
-    here("f1.png")
-    monkeypatch.setattr(sys, "stdin", None)
-
-    with pytest.raises(UsageError, match="stdin is closed"):
-        find_inputs(["-"])
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """A small file never takes much memory, whatever it claims, and large maps are read up to a stated size."""
 
-import subprocess
 import sys
 import zlib
 
@@ -12,12 +11,13 @@ from rollcli.errors import InputError
 from rollcli.files.codecs import arrays
 from rollcli.files.formats import decode_image, decode_stored
 from tests.binary_files import make_npy, make_png, make_tiff, png_file, png_header, tiff_of_bits
-from tests.run_cli import command, environment
+from tests.run_cli import python
 
 GIB = 2**30
 # a process counts the memory of the one that starts it, as of a test that had much: a small one is in between
 PEAK = """import subprocess, sys; from resource import RUSAGE_CHILDREN, getrusage
-print(subprocess.call([sys.executable, *sys.argv[1:]]), getrusage(RUSAGE_CHILDREN).ru_maxrss)"""
+status = subprocess.call([sys.executable, *sys.argv[1:]])
+print(status, getrusage(RUSAGE_CHILDREN).ru_maxrss, file=sys.stderr)"""
 
 
 def png_of(width, height, depth, colour=0, palette=b""):
@@ -69,10 +69,10 @@ def test_small_files_at_the_limit_take_less_than_a_gigabyte(tmp_path):
     }.items():
         (maps / name).write_bytes(data)
         assert len(data) < 2**20
-    python, *line = command("estimate", "maps", "-q", "-o", "rolls.csv", "-j", "1")
+    line = ("estimate", "maps", "-q", "-o", "rolls.csv", "-j", "1")
 
-    found = subprocess.check_output([python, "-c", PEAK, *line], cwd=tmp_path, env=environment())
-    status, peak = map(int, found.split())
+    found = python(PEAK, "-m", "rollcli", *line, cwd=tmp_path, check=True)
+    status, peak = map(int, found.stderr.split()[-2:])
 
     assert status == 3
     assert len((tmp_path / "rolls.csv").read_text().splitlines()) == 6

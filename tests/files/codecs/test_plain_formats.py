@@ -41,13 +41,9 @@ def bmp(width, height, bits, body, *, size=40, packing=0, between=b""):
     return file + header.ljust(size, b"\0") + palette + between + body
 
 
-def rows_of(pixels, bits):
+def rows_of(pixels):
     """Rows of 4, 8, ... bytes each, from the bottom up."""
-    body = b""
-    for row in pixels[::-1]:
-        plain = row.tobytes()
-        body += plain + bytes(-len(plain) % 4)
-    return body
+    return b"".join(row.tobytes() + bytes(-row.nbytes % 4) for row in pixels[::-1])
 
 
 def refusal(data):
@@ -62,8 +58,8 @@ def test_bitmaps_are_read_from_the_bottom_up_or_from_the_top_down(bits, width, s
     pixels = np.random.default_rng(0).integers(0, 256, shape, dtype=np.uint8)
     expected = pixels if bits == 8 else pixels[..., :3]
 
-    upwards = bmp(width, 3, bits, rows_of(pixels, bits), size=size)
-    downwards = bmp(width, -3, bits, rows_of(pixels[::-1], bits), size=size, between=b"gap.")
+    upwards = bmp(width, 3, bits, rows_of(pixels), size=size)
+    downwards = bmp(width, -3, bits, rows_of(pixels[::-1]), size=size, between=b"gap.")
 
     for data in (upwards, downwards, upwards + b"more"):
         np.testing.assert_array_equal(decode_image(data, "x"), expected)
