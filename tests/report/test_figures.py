@@ -49,18 +49,19 @@ def drawn(rows, name="roll"):
     return decoded(chart_file(all_charts(rows, assess_rig(rows))[name], "png"))
 
 
-@pytest.mark.parametrize("name", ["roll", "histogram"])
-def test_an_svg_has_the_size_of_a_slide_a_title_axes_with_units_and_a_legend(charts, name):
+@pytest.mark.parametrize(
+    ("name", "begins", "words"),
+    [
+        ("roll", "Roll in degrees", ["frame", "95 % interval", "suspect", "failed", "jump", "mounting"]),
+        ("histogram", "How many", ["frames", "ok", "suspect"]),
+    ],
+)
+def test_an_svg_has_the_size_of_a_slide_a_title_axes_with_units_and_a_legend(charts, name, begins, words):
     root = ET.fromstring(chart_file(charts[name], "svg"))
     assert (root.get("width"), root.get("height")) == ("960pt", "420pt")
-    begins = {"roll": "Roll in degrees", "histogram": "How many"}[name]
     assert next(root.iter("{http://purl.org/dc/elements/1.1/}title")).text.startswith(begins)
-    expected = {
-        "roll": ["frame", "roll, degrees", "95 % interval", "suspect", "failed", "jump", "mounting"],
-        "histogram": ["frames", "roll, degrees", "ok", "suspect"],
-    }[name]
     texts = [each.text for each in root.iter(f"{SVG}text")]
-    assert [each for each in expected if each not in texts] == []
+    assert [each for each in ("roll, degrees", *words) if each not in texts] == []
 
 
 def test_a_pdf_has_the_same_size_and_its_letters_are_letters(charts):

@@ -133,15 +133,7 @@ def _pairs():
     return _assessed(rows, {"roll": sequence(16, known(1.125, 0.0625))} | parts)
 
 
-RESULTS = {
-    "one": _one,
-    "level": _level,
-    "failed": _failed,
-    "mixed": _mixed,
-    "drives": _drives,
-    "long": _long,
-    "pairs": _pairs,
-}
+RESULTS = {make.__name__[1:]: make for make in (_one, _level, _failed, _mixed, _drives, _long, _pairs)}
 
 
 def _shortened(value):

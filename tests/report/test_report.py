@@ -79,21 +79,19 @@ def test_a_page_holds_everything_it_shows(folder):
     assert "<script src" not in text
 
 
-def test_the_summary_says_options_version_counts_and_the_sign(folder):
+def test_the_summary_says_options_version_counts_and_when_the_result_was_written(folder):
     report(folder, "out/rolls.csv")
     text = html.unescape(
         re.sub(r"\s+", " ", re.sub(r"<(script|style).*?</\1>|<[^>]+>", " ", page_of(folder), flags=re.S))
     )
     run = json.loads((folder / "out" / "rolls.csv.run.json").read_text())
-    assert f"rollcli {run['rollcli']}" in text
-    assert "frames 4 ok 3 suspect 0 failed 1" in text
-    assert "--max-roll 45" in text
-    assert "nine in ten frames" in text
-    assert "its right end is up" in text
-    assert "Shown: 3 of 3 frames with an angle." in text
-    assert "inputs from maps" in text
     written = datetime.fromtimestamp((folder / "out" / "rolls.csv").stat().st_mtime, timezone.utc)
-    assert f"result written {written:%Y-%m-%d %H:%M} UTC" in text
+    for said in (
+        *(f"rollcli {run['rollcli']}", "--max-roll 45", "inputs from maps"),
+        *("frames 4 ok 3 suspect 0 failed 1", "Shown: 3 of 3 frames with an angle."),
+        f"result written {written:%Y-%m-%d %H:%M} UTC",
+    ):
+        assert said in text
 
 
 @pytest.mark.parametrize("images", mostly_slow(["out", "out/upright", "out/v"], "out"))
