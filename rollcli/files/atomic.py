@@ -62,7 +62,6 @@ def mode_of(path: str | Path, unseen: int = 0) -> int:
         return unseen
 
 
-_ON_WINDOWS = os.name == "nt"
 # 64 files of 300 kB take 0.3 ms each on ext4, and 4 ms each by one thread; 10,000 small objects, of 50 ms
 # each, half a minute
 _THREADS = 16
@@ -87,7 +86,7 @@ def sync_files(paths: Iterable[str | Path], named: set[Path] | None = None) -> N
     """
     every = [Path(path) for path in paths]
     # Windows forces only what is open for writing
-    flags = os.O_RDWR if _ON_WINDOWS else os.O_RDONLY
+    flags = os.O_RDWR if os.name == "nt" else os.O_RDONLY
     in_threads(partial(_sync, flags, (errno.ENOENT,)), every)
     sync_names(every, named)
 

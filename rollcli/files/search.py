@@ -148,12 +148,11 @@ class Search:
         path = Path(argument)
         if is_folder(path):
             return self._wanted(argument, self._in_folder(path), "folder")
-        if literal or not glob.has_magic(argument) or os.path.lexists(path):
-            refuse_others(argument)
-            if is_archive(argument) and is_file(path):
-                return self._wanted(argument, self._in_archive(argument), "archive")
-            return self._named(argument, frame_name(path.name) if "#" in argument else path.name)
-        return self._wanted(argument, self._in_pattern(argument), "pattern")
+        if not literal and glob.has_magic(argument) and not os.path.lexists(path):
+            return self._wanted(argument, self._in_pattern(argument), "pattern")
+        if is_archive(argument) and is_file(path):
+            return self._wanted(argument, self._in_archive(argument), "archive")
+        return self._named(argument, frame_name(path.name) if "#" in argument else path.name)
 
     def allows(self, location: str, *, found: bool = False) -> bool:
         """Tell whether --include and --exclude allow a file.
@@ -176,6 +175,7 @@ class Search:
         return (not self.include or fits(self.include)) and not fits(self.exclude)
 
     def _named(self, location: str, name: str) -> Iterator[tuple[str, str]]:
+        refuse_others(location)
         return iter([(location, name)] if self.allows(location) else [])
 
     def _wanted(
@@ -284,7 +284,6 @@ class Search:
         """Yield the objects behind a URL: one, or those of a prefix or pattern that are readable."""
         pattern = not literal and is_object_url(url) and glob.has_magic(url)
         if not pattern and (literal or not is_folder_url(url)):
-            refuse_others(url)
             return self._named(url, base_name(url))
         folder = f"{url.rstrip('/')}/"
         if folder in self._skipped_urls:

@@ -175,7 +175,7 @@ def read_problem(url: str) -> str:
         from rollcli.files.stores.web import web_problem
 
         return web_problem(url)
-    return objects.object_problem(url)
+    return objects.problem_of(url, writes=False)
 
 
 def write_problem(folder: str) -> str:
@@ -186,7 +186,7 @@ def write_problem(folder: str) -> str:
     UsageError
         The scheme is not supported, or an extra is missing.
     """
-    return _READ_ONLY if is_web_url(folder) else objects.folder_problem(folder)
+    return _READ_ONLY if is_web_url(folder) else objects.problem_of(folder, writes=True)
 
 
 def write_bytes(location: str, data: bytes, *, durable: bool = False, owner: str = "") -> None:

@@ -178,8 +178,10 @@ def object_owner(url: str) -> str:
     return ""
 
 
-def object_problem(url: str) -> str:
-    """Say what keeps an object from being read, and probably others; empty where nothing does.
+def problem_of(url: str, *, writes: bool) -> str:
+    """Say what keeps an object from being read, or what lies below a prefix from being written.
+
+    It keeps others, too, probably. Empty where nothing is known to.
 
     Raises
     ------
@@ -187,31 +189,16 @@ def object_problem(url: str) -> str:
         The extra `storage` is not installed, or the store's settings are wrong.
     """
     store, key = _open(url)
-    reason = _objection(lambda: store.get_range(key, start=0, length=1))
-    return reason if holds_for_all(reason) or reason == DENIED else ""
-
-
-def folder_problem(url: str) -> str:
-    """Say what keeps everything below a prefix from being written; empty where nothing is known to.
-
-    Raises
-    ------
-    UsageError
-        The extra `storage` is not installed, or the store's settings are wrong.
-    """
-    store, prefix = _open(url)
-    reason = _objection(lambda: next(iter(store.list(prefix.rstrip("/") or None, chunk_size=1)), None))
-    return reason if holds_for_all(reason) else ""
-
-
-def _objection(ask: Callable[[], Any]) -> str:
-    """Return what a store objects to; empty where it does not."""
     from obstore.exceptions import BaseError
 
     try:
-        ask()
+        if writes:
+            next(iter(store.list(key.rstrip("/") or None, chunk_size=1)), None)
+        else:
+            store.get_range(key, start=0, length=1)
     except (BaseError, OSError, RuntimeError) as error:
-        return reason_of(error)
+        reason = reason_of(error)
+        return reason if holds_for_all(reason) or (reason == DENIED and not writes) else ""
     return ""
 
 

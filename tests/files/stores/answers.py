@@ -75,8 +75,8 @@ DOINGS = {
     "read": (lambda: objects.read_object(URL), "yes", "untagged"),
     "read small": (lambda: objects.read_object(URL, 4), "yes", "untagged"),
     "owner": (lambda: objects.object_owner(URL), "owned", "yes"),
-    "problem": (lambda: objects.object_problem(URL), "part"),
-    "problem of a folder": (lambda: objects.folder_problem("s3://maps/p/"), "empty", "last"),
+    "problem": (lambda: objects.problem_of(URL, writes=False), "part"),
+    "problem of a folder": (lambda: objects.problem_of("s3://maps/p/", writes=True), "empty", "last"),
     "write": (lambda: objects.write_object(URL, b"5", "me"), "yes"),
     "create": (
         lambda: objects.create_object(URL, b"5", "me"),
