@@ -100,11 +100,10 @@ def to_disparity(
         positive = stored.values
         if factor < 0:  # whole numbers get room for their lowest
             positive = -(positive if positive.dtype.kind == "f" else positive.astype(np.float64))
-        disparity = (
-            _from_depth(positive, abs(factor), calibration)
-            if used is Encoding.DEPTH
-            else _scaled(positive, used, abs(factor))
-        )
+        if used is Encoding.DEPTH:
+            disparity = _from_depth(positive, abs(factor), calibration)
+        else:
+            disparity = _scaled(positive, used, abs(factor))
         for value in (*invalid, *stored.nodata, *_saturated(stored.values)):
             if math.isfinite(value):  # the others are no data already
                 disparity[stored.values == value] = 0

@@ -193,12 +193,10 @@ def _images(row: Row, images: _ImageFolder, recorded: ImageOptions) -> dict[str,
 
 
 def _image(kind: ImageKind, row: Row, images: _ImageFolder, recorded: ImageOptions) -> str | None:
-    for folder in _folders(kind.name, images, recorded):
-        for name in _tails(row.file):
-            for ending in (".png",) if kind.holds == "picture" else MAP_ENDINGS:
-                if found := images.find(f"{folder}{name}{ending}"):
-                    return found
-    return None
+    folders, names = _folders(kind.name, images, recorded), [*_tails(row.file)]
+    endings = (".png",) if kind.holds == "picture" else MAP_ENDINGS
+    places = (f"{folder}{name}{ending}" for folder in folders for name in names for ending in endings)
+    return next(filter(None, map(images.find, places)), None)
 
 
 _TRUE = ("disparity", "heights")  # beside the truth of a simulation they are not those of a run

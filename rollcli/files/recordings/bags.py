@@ -189,7 +189,7 @@ class _Chunked:
                 return 0
             return _BEGINNING if topic.name in begins else _ALL
 
-        offset, damaged = self.start, -1
+        offset, damaged = self.start, list[int]()
         try:
             while offset < self._size:
                 found = self._record(offset, wanted)
@@ -197,16 +197,14 @@ class _Chunked:
                     if wanted(channel, number):
                         yield Message(self._topics[channel].name, time, (offset, number), data)
                 if not found.whole:
-                    if found.after > self._size:
-                        raise _BrokenError
-                    damaged = offset if damaged < 0 else damaged  # what follows the chunk may be whole
+                    damaged.append(offset)  # what follows the chunk may be whole
                 if found.after <= offset:  # the end of the messages
                     break
                 offset = found.after
         except _DAMAGED:
-            damaged = offset if damaged < 0 else damaged
-        if damaged >= 0:
-            self.broken = f"is damaged or cut off in what begins at byte {damaged} of its {self._size}"
+            damaged.append(offset)
+        if damaged:
+            self.broken = f"is damaged or cut off in what begins at byte {damaged[0]} of its {self._size}"
 
     def read(self, place: tuple[int, ...]) -> Message:
         """Read one message."""
