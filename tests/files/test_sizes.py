@@ -80,11 +80,6 @@ def test_small_files_at_the_limit_take_less_than_a_gigabyte(tmp_path):
     assert peak * 1024 < GIB
 
 
-def _jpeg(channels):
-    shape = (7, 13, 3) if channels == 3 else (7, 13)
-    return cv2.imencode(".jpg", np.zeros(shape, np.uint8))[1].tobytes()
-
-
 def _pixels(kind, *channels):
     return np.zeros((7, 13, *channels), kind)
 
@@ -105,8 +100,8 @@ COUNTED = {
     "colour8.tif": (decode_image, lambda: make_tiff(_pixels("u1", 3), photometric=2), 4),
     "colour16.tif": (decode_image, lambda: make_tiff(_pixels("u2", 3), photometric=2), 6),
     "f8.npy": (decode_stored, lambda: make_npy(_pixels("f8")), 8),
-    "grey.jpg": (decode_image, lambda: _jpeg(1), 4),
-    "colour.jpg": (decode_image, lambda: _jpeg(3), 4),
+    "grey.jpg": (decode_image, lambda: cv2.imencode(".jpg", _pixels("u1"))[1].tobytes(), 4),
+    "colour.jpg": (decode_image, lambda: cv2.imencode(".jpg", _pixels("u1", 3))[1].tobytes(), 4),
 }
 
 

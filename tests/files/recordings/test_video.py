@@ -5,7 +5,6 @@ import math
 import os
 import re
 import struct
-import zlib
 from concurrent.futures import ThreadPoolExecutor
 
 import cv2
@@ -15,6 +14,7 @@ import pytest
 import rollcli as package
 from rollcli.errors import InputError, UsageError
 from rollcli.files.formats import read_image
+from tests.binary_files import png_chunk
 from tests.run_cli import keep_rows, road_map, rollcli, write_pair
 from tests.run_cli import rows_of as rows
 from tests.slow import mostly_slow
@@ -61,9 +61,7 @@ def without_names(found):
 
 def padded(png, size):
     """The same PNG, as long as is asked, by a chunk of text."""
-    chunk = b"tEXt" + b"a" * (size - len(png) - 12)
-    text = struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
-    return png[:-12] + text + png[-12:]
+    return png[:-12] + png_chunk(b"tEXt", b"a" * (size - len(png) - 12)) + png[-12:]
 
 
 def beside(views):
