@@ -18,7 +18,7 @@ from rollcli.messages import say
 _PATIENCE_S = 2.0
 _POLL_S = 0.05
 
-_LOCK = ".lock"
+_LOCK, _BUSY = ".lock", "another run is writing this result"
 
 
 if sys.platform == "win32":
@@ -134,9 +134,7 @@ def _lock_file(name: str) -> Iterator[None]:
         try:
             path.touch(exist_ok=False)
         except FileExistsError:
-            raise UsageError(
-                f"{name}: another run is writing this result; if none is, one was killed: remove {path}"
-            ) from None
+            raise UsageError(f"{name}: {_BUSY}; if none is, one was killed: remove {path}") from None
     try:
         yield
     finally:
@@ -154,9 +152,7 @@ def take_lock(descriptor: int, name: str) -> bool:
     give_up = time.monotonic() + _PATIENCE_S
     while (taken := _try_lock(descriptor)) is False:
         if time.monotonic() > give_up:
-            raise UsageError(
-                f"{name}: another run is writing this result; wait for it, or give another --output"
-            )
+            raise UsageError(f"{name}: {_BUSY}; wait for it, or give another --output")
         time.sleep(_POLL_S)
     return bool(taken)
 
