@@ -126,9 +126,8 @@ def refuse_others(location: str) -> None:
     if is_archive(base_name(location)):
         require_local(location, "archives are read from local disk: download it first")
     if location.lower().endswith(_PACKED):
-        raise UsageError(
-            f"{location}: its members cannot be read one by one; unpack it, or pack it as .zip or .tar"
-        )
+        hint = "unpack it, or pack it as .zip or .tar"
+        raise UsageError(f"{location}: its members cannot be read one by one; {hint}")
 
 
 def members(path: str) -> Iterator[tuple[str, str]]:

@@ -160,6 +160,7 @@ _CHUNKY = 1
 _LARGE_TILE = 2**22  # pixels; a small image may lie in one large tile
 _NOT_A_PAGE_OF_ITS_OWN = 0b101  # a reduced copy, or a mask, of another page
 _GDAL_NODATA = 42113
+_WRITTEN: dict[str, Any] = {"photometric": "minisblack", "metadata": None, "software": False}
 # what tifffile logs about damage is raised here
 logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
@@ -195,15 +196,7 @@ def encode_tiff(values: NDArray[Any], nodata: tuple[float, ...] = (), descriptio
 
     tags = [(_GDAL_NODATA, "s", 0, f"{nodata[0]:.17g}", True)] if nodata else []
     buffer = io.BytesIO()
-    tifffile.imwrite(
-        buffer,
-        values,
-        photometric="minisblack",
-        metadata=None,
-        description=description or None,
-        software=False,
-        extratags=tags,
-    )
+    tifffile.imwrite(buffer, values, description=description or None, extratags=tags, **_WRITTEN)
     return buffer.getvalue()
 
 

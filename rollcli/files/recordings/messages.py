@@ -106,9 +106,8 @@ def check_decoder(topic: Topic) -> None:
         kind = topic.type or "unknown"
         raise InputError(f"{topic.name} has messages of the type {kind}, not images of ROS{hint}")
     if topic.encoding not in ("cdr", "ros1"):
-        raise InputError(
-            f"{topic.name} is serialized as {topic.encoding or 'nothing'}; cdr and ros1 are read"
-        )
+        form = topic.encoding or "nothing"
+        raise InputError(f"{topic.name} is serialized as {form}; cdr and ros1 are read")
 
 
 def camera_info(topic: Topic, data: memoryview) -> CameraInfo:
