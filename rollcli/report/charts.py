@@ -49,13 +49,16 @@ class FrameAxis:
         """Return the axis as plotly takes it."""
         if self.unit:
             last = self.places[-1]  # the first stands at 0
-            span = [-0.01 * last, last + 0.01 * last]
-            return {"title": {"text": f"time, {self.unit}"}, "range": span, "zeroline": False}
+            return _axis(f"time, {self.unit}", (-0.01 * last, last + 0.01 * last), zeroline=False)
         count = len(self.places)
         margin = max(0.5, 0.01 * count)
         few = {"dtick": 1} if count <= _FEW else {}  # there are no half frames
-        span = [1 - margin, count + margin]
-        return {"title": {"text": "frame"}, "range": span, "zeroline": False, "tickformat": ",d", **few}
+        return _axis("frame", (1 - margin, count + margin), zeroline=False, tickformat=",d", **few)
+
+
+def _axis(title: str, ends: Sequence[float], **further: Any) -> dict[str, Any]:
+    """Return an axis as plotly takes it."""
+    return {"title": {"text": title}, "range": list(ends), **further}
 
 
 def frame_axis(rows: Sequence[Row], rig: RigAssessment) -> FrameAxis:
@@ -270,7 +273,7 @@ def alignment(rows: Sequence[Row], rig: RigAssessment) -> Chart:
         "hovermode": "closest",
         "showlegend": True,
         "xaxis": axis.layout(),
-        "yaxis": {"title": {"text": "shift of rows, px"}, "range": [-end, end], "zeroline": True},
+        "yaxis": _axis("shift of rows, px", (-end, end), zeroline=True),
     }
     return Chart("alignment", f"How the right view lies over {len(rows)} frames, px", data, layout)
 
@@ -351,11 +354,7 @@ def chart_over_frames(rows: Sequence[Row], quantity: Quantity, rig: RigAssessmen
         "hoverdistance": -1,
         "showlegend": True,
         "xaxis": axis.layout(),
-        "yaxis": {
-            "title": {"text": f"{quantity.name}, {unit}"},
-            "range": list(ends),
-            "zeroline": quantity is ROLL,
-        },
+        "yaxis": _axis(f"{quantity.name}, {unit}", ends, zeroline=quantity is ROLL),
         "yaxis2": {"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True},
     }
     what = (
@@ -403,11 +402,11 @@ def histogram(rows: Sequence[Row]) -> Chart:
     width, highest = float(np.ptp(edges)), int(np.histogram(shown, edges)[0].max())
     margin = max(0.02 * width, (_FEW_BINS * step - width) / 2)  # a single bar would fill the chart
     whole = {"dtick": 1} if highest <= _FEW_BINS else {}  # there are no half frames
-    ends = [float(edges[0]) - margin, float(edges[-1]) + margin]
+    ends = float(edges[0]) - margin, float(edges[-1]) + margin
     layout = {
         "barmode": "stack",
         "showlegend": [trace["name"] for trace in data] != ["ok"],
-        "xaxis": {"title": {"text": "roll, degrees"}, "range": ends, "zeroline": False},
-        "yaxis": {"title": {"text": "frames"}, "range": [0, 1.05 * max(highest, 1)], **whole},
+        "xaxis": _axis("roll, degrees", ends, zeroline=False),
+        "yaxis": _axis("frames", (0, 1.05 * max(highest, 1)), **whole),
     }
     return Chart("histogram", "How many frames have which roll", data, layout)
