@@ -270,9 +270,7 @@ CASES = {
     "disparities, empty": lambda: _picture(draw_disparity, np.zeros((9, 12))),
     **{
         f"preview of {height} rows to {top:g} px": partial(
-            lambda height, top: _picture(draw_preview, np.linspace(0, top, 40 * height).reshape(height, 40)),
-            height,
-            top,
+            _picture, draw_preview, np.linspace(0, top, 40 * height).reshape(height, 40)
         )
         for height, top in ((40, 60.0), (50, 33.0), (51, 60.0), (120, 0.7), (260, 150.0))
     },
@@ -283,9 +281,7 @@ CASES = {
     ),
     **{
         f"v-disparity of {height} rows": partial(
-            lambda height, horizon: _picture(draw_v_disparity, _histogram(height), CURVE, 5.0, horizon),
-            height,
-            horizon,
+            _picture, draw_v_disparity, _histogram(height), CURVE, 5.0, horizon
         )
         for height, horizon in ((120, 31.0), (479, 2.0), (960, 400.4))
     },

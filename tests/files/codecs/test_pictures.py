@@ -14,36 +14,39 @@ from tests.run_cli import python
 IMAGE = cv2.GaussianBlur(np.random.default_rng(0).integers(0, 256, (120, 160), dtype=np.uint8), (0, 0), 2)
 WHOLE = cv2.imencode(".jpg", IMAGE)[1].tobytes()
 END = b"\xff\xd9"
-READ = (
-    "import sys\n"
-    "from rollcli.errors import InputError\n"
-    "from rollcli.files.codecs.png import silence_decoders\n"
-    "from rollcli.files.formats import decode_image\n"
-    "silence_decoders()\n"
-    "try:\n"
-    "    print(decode_image(sys.stdin.buffer.read(), 'x.jpg').shape)\n"
-    "except InputError as error:\n"
-    "    print(error)\n"
-)
+# a process that works on frames, where what libraries print is heard; it reads images, and then maps
+WORKER = """
+import sys
+from rollcli.errors import InputError
+from rollcli.files.codecs.png import silence_decoders
+from rollcli.files.formats import read_image, read_stored
+silence_decoders()
+for read, path in ((read, path) for read in (read_image, read_stored) for path in sys.argv[1:]):
+    try:
+        print(getattr(read(path), "shape", "map"))
+    except InputError as error:
+        print(error)
+"""
 
 
-def in_a_worker(data):
-    """What a process says that works on frames, where what libjpeg prints is heard."""
-    done = python(READ, input=data, text=False, check=True)
-    assert done.stderr == b""
-    return done.stdout.decode().strip()
+def in_a_worker(folder, data):
+    """What a worker says of an image."""
+    (folder / "x.jpg").write_bytes(data)
+    done = python(WORKER, "x.jpg", cwd=folder, check=True)
+    assert done.stderr == ""
+    return done.stdout.splitlines()[0]
 
 
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.95])
-def test_a_jpeg_that_was_cut_and_closed_is_refused(share):
+def test_a_jpeg_that_was_cut_and_closed_is_refused(tmp_path, share):
     start = WHOLE.index(b"\xff\xda") + 14
     cut = WHOLE[: start + int(share * (len(WHOLE) - start))] + END
 
-    assert in_a_worker(cut) == "x.jpg: is a damaged JPEG: premature end of data segment"
+    assert in_a_worker(tmp_path, cut) == "x.jpg: is a damaged JPEG: premature end of data segment"
 
 
-def test_bytes_before_the_end_that_webcams_write_harm_nothing():
-    assert in_a_worker(WHOLE[:-2] + bytes(3) + END) == "(120, 160)"
+def test_bytes_before_the_end_that_webcams_write_harm_nothing(tmp_path):
+    assert in_a_worker(tmp_path, WHOLE[:-2] + bytes(3) + END) == "(120, 160)"
 
 
 @pytest.mark.parametrize("progressive", [False, True])
