@@ -53,17 +53,12 @@ def test_what_a_power_cut_left_is_replaced_and_nothing_else(tmp_path, there):
     assert path.read_bytes() == (whole if there in LEFT else there)
 
 
-@pytest.mark.parametrize("kind", ["folder", "link to nothing", "pipe"])
-def test_what_is_no_file_is_not_replaced_and_not_waited_for(tmp_path, kind):
+@pytest.mark.parametrize(("make", "source"), [("mkdir", ()), ("mkfifo", ()), ("symlink", ("nothing",))])
+def test_what_is_no_file_is_not_replaced_and_not_waited_for(tmp_path, make, source):
     path = tmp_path / "map.png"
-    if kind == "folder":
-        path.mkdir()
-    elif kind == "pipe":
-        os.mkfifo(path)
-    else:
-        path.symlink_to("nothing")
+    getattr(os, make)(*source, path)
     before = path.lstat()
-    if kind == "folder":
+    if make == "mkdir":
         with pytest.raises(OutputError, match="is a folder"):
             storage.create(str(path), b"data", durable=False)
     else:

@@ -11,6 +11,7 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
 KINDS = ("bag", "db3", "mcap", "folder")
+UPRIGHT = tuple(np.eye(3).ravel())
 ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
 
 
@@ -51,16 +52,10 @@ def disparity_image(store, values, stamp, number=0, focal=700.0, baseline=0.5, l
     )
 
 
-def camera_info(store, stamp, size, p, d=(), k=None, r=None, number=0, region=(0, 0, 0, 0)):
+def camera_info(store, stamp, size, p, d=(), k=UPRIGHT, r=UPRIGHT, number=0, region=(0, 0, 0, 0)):
     """A CameraInfo, of a region (x, y, height, width) of the image; ROS 1 has capital letters."""
-    values = {
-        "d": np.array(d, np.float64),
-        "k": np.array(k if k is not None else np.eye(3).ravel(), np.float64),
-        "r": np.array(r if r is not None else np.eye(3).ravel(), np.float64),
-        "p": np.array(p, np.float64),
-    }
-    if store is ROS1:
-        values = {key.upper(): each for key, each in values.items()}
+    names = "DKRP" if store is ROS1 else "dkrp"
+    values = {name: np.array(each, np.float64) for name, each in zip(names, (d, k, r, p), strict=True)}
     return store.types["sensor_msgs/msg/CameraInfo"](
         header=header(store, stamp, number),
         height=size[1],
