@@ -27,17 +27,15 @@ _LIST = "the list of files"
 _BLOCK = 4096  # lines between two places that are known: 100,000,000 lines have 200 kB of places
 
 
-def find_inputs(
-    inputs: Iterable[str], search: Search | None = None, *, files_from: str | None = None
-) -> list[Input]:
+def find_inputs(inputs: Iterable[str], search: Search, *, files_from: str | None = None) -> list[Input]:
     """Find every file that the arguments name, sorted naturally, each once.
 
     Parameters
     ----------
     inputs : iterable of str
         Files, folders, glob patterns (``**`` too), or "-" for paths on stdin, one a line.
-    search : Search, optional
-        How they are searched; by default for maps, each folder by itself.
+    search : Search
+        How they are searched.
     files_from : str, optional
         A file that holds paths, one a line; "-" is stdin.
 
@@ -52,7 +50,6 @@ def find_inputs(
     UsageError
         Nothing is found at all, or a folder or pattern holds nothing, or a list cannot be read.
     """
-    search = search or Search()
     found: list[Input] = []
     seen = set[tuple[str, str]]()  # the names of one folder share its text
     real = functools.cache(os.path.realpath)  # one folder holds thousands of files

@@ -40,16 +40,14 @@ FORMATS = (
 )
 
 
-def parse_calibration(
-    files: Sequence[tuple[str, bytes]], given: CalibrationOptions | None = None
-) -> Calibration:
+def parse_calibration(files: Sequence[tuple[str, bytes]], given: CalibrationOptions) -> Calibration:
     """Read a calibration.
 
     Parameters
     ----------
     files : sequence of (name, data)
         One file of any format of `FORMATS`, two for ROS (left, right), or none.
-    given : CalibrationOptions, optional
+    given : CalibrationOptions
         Numbers that win over those of the files.
 
     Returns
@@ -63,7 +61,6 @@ def parse_calibration(
     UsageError
         Numbers are missing or cannot be those of a rig; the message says which options to add.
     """
-    given = given or CalibrationOptions()
     fields = _read([_text(name, data) for name, data in files]) if files else Fields()
     source = " and ".join(name for name, _ in files)
     return _complete(_overridden(fields, given), _source(source, given), source)

@@ -37,10 +37,10 @@ def test_stdin_is_read_and_a_closed_one_is_named(here, monkeypatch):
     here("ä.png")
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO("ä.png\n".encode())))
 
-    assert names(find_inputs(["-"])) == ["ä.png"]
+    assert names(find_inputs(["-"], Search())) == ["ä.png"]
     monkeypatch.setattr(sys, "stdin", None)
     with pytest.raises(UsageError, match="stdin is closed"):
-        find_inputs(["-"])
+        find_inputs(["-"], Search())
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have no names that are no text")
@@ -50,8 +50,8 @@ def test_names_that_are_no_text_are_found(here):
     (root / name).write_bytes(b"x")
     (root / "list.txt").write_bytes(b"\xff.png\n")
 
-    assert names(find_inputs([], files_from="list.txt")) == [name]
-    assert name in names(find_inputs(["."]))
+    assert names(find_inputs([], Search(), files_from="list.txt")) == [name]
+    assert name in names(find_inputs(["."], Search()))
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
@@ -59,7 +59,7 @@ def test_pipes_and_folders_with_readable_endings_are_no_files(here):
     root = here("maps/f1.png", "maps/folder.png/f2.png")
     os.mkfifo(root / "maps" / "pipe.png")
 
-    assert names(find_inputs(["maps"])) == ["maps/f1.png"]
+    assert names(find_inputs(["maps"], Search())) == ["maps/f1.png"]
 
 
 @pytest.fixture
@@ -82,7 +82,7 @@ def test_a_thousand_nested_folders_are_searched(deep):
 
     assert [each.relative for each in found] == ["d/" * 1000 + "map.png", "map.png"]
     with pytest.raises(UsageError, match="too deep for a pattern; name the folder, with --recursive"):
-        find_inputs([f"{deep}/**/*.png"])
+        find_inputs([f"{deep}/**/*.png"], Search())
 
 
 def test_a_file_that_the_system_refuses_to_look_at_is_an_input_that_its_row_will_explain(here, monkeypatch):
@@ -96,4 +96,4 @@ def test_a_file_that_the_system_refuses_to_look_at_is_an_input_that_its_row_will
 
     monkeypatch.setattr(os, "stat", refuse)
 
-    assert names(find_inputs(["maps"])) == ["maps/a.png", "maps/b.png"]
+    assert names(find_inputs(["maps"], Search())) == ["maps/a.png", "maps/b.png"]
