@@ -157,6 +157,7 @@ def _read(line):
     return READ[kind](text.encode().decode("unicode_escape").encode("latin-1"))
 
 
+SMALL_AND_LARGE = (0.001, 0.5, 1.25, 2.5019, 90, 65534 / 256, 65535 / 256, 300)
 VALUES = "-inf -1 -0 1 2 7.5 16 255 300 32767 65534 65535 inf nan"
 
 
@@ -170,11 +171,6 @@ def _to_pixels(kind, **options):
     if isinstance(found, str):
         return found
     return [found.encoding, str(found.disparity.dtype), found.disparity.ravel(), found.warnings]
-
-
-def _to_kitti():
-    ends = [0.001, 0.5, 1.25, 2.5019, 90, 65534 / 256, 65535 / 256, 300]
-    return encodings.to_kitti(np.array([[0, -1, np.nan, np.inf, *ends]]))
 
 
 def _plateau(make):
@@ -294,7 +290,7 @@ CASES = {
         for name, each in CALIBRATIONS.items()
     },
     "pixels: unknown": partial(_to_pixels, "f4", encoding="middlebury"),
-    "stored as KITTI's": _to_kitti,
+    "stored as KITTI's": lambda: encodings.to_kitti(np.array([[0, -1, np.nan, np.inf, *SMALL_AND_LARGE]])),
     **{f"plateau: {name}": partial(_plateau, make) for name, make in PLATEAUS.items()},
     **{f"row: {name}": partial(_written, row) for name, row in ROWS.items()},
     "tiff: deflate": partial(_tiff, compression="zlib", predictor=True, rowsperstrip=9),
