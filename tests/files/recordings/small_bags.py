@@ -222,13 +222,7 @@ def _info(changes):
 
 STAMPS = {
     "ros1": [struct.pack("<III", 9, 3, 4), struct.pack("<III", 9, 0, 0), bytes(11), b""],
-    "cdr": [
-        b"\0\1\0\0" + struct.pack("<iI", 3, 4),
-        b"\0\0\0\0" + struct.pack(">iI", -3, 4),
-        bytes(12),
-        b"\0",
-        b"",
-    ],
+    "cdr": [struct.pack("<4siI", b"\0\1", 3, 4), struct.pack(">4siI", b"", -3, 4), bytes(12), b"\0", b""],
 }
 
 
@@ -237,10 +231,6 @@ def _stamps():
         form: [messages.stamp_of(Topic("/a", "x", form), memoryview(each), 77) for each in given]
         for form, given in STAMPS.items()
     }
-
-
-def _checked(kind, encoding):
-    return made(messages.check_decoder, Topic("/a", kind, encoding))
 
 
 def _image(encoding, width, height, step, size=None, big=False):
@@ -323,7 +313,7 @@ CASES = {
     ],
     "camera infos": lambda: {name: _info(changes) for name, changes in INPUTS["cameras"].items()},
     "stamps": _stamps,
-    "decoders": lambda: [_checked(*each) for each in INPUTS["topics"]],
+    "decoders": lambda: [made(messages.check_decoder, Topic("/a", *each)) for each in INPUTS["topics"]],
     "pixels of messages": lambda: [_content(_image(*each)) for each in INPUTS["images"]],
     "disparities of messages": lambda: (
         [_disparities(each) for each in (-1.0, 0.0, 1.0, 3.5, 9.0)] + [_disparities(9.0, "mono8")]
