@@ -46,7 +46,7 @@ class RollEstimate:
     camber : float or None
         Curvature across the road, 1/(camera height): x camera heights to the side, the surface is higher by
         camber/2 x^2 camera heights. Negative: crowned. 0 where it may be noise; None where the map does not
-        determine it.
+        determine it. Without a calibration it is that of a level camera: 1 / cos(pitch)^2 times as large.
     tangent : Tangent
         The line that touches the road's parabola amid the pixels used.
     pitch, pitch_ci95 : float or None

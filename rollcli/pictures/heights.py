@@ -87,17 +87,19 @@ class FittedRoad:
     def of_row(cls, row: Row, calibration: Calibration | None) -> "FittedRoad | None":
         """Take the road of a row of a result; None where the row has none.
 
-        Roll and camber of a row with a pitch are the rig's: where fx and fy differ, `calibration` turns them
-        back into those of the pixels, the roll where the row has that of the rig alone.
+        Roll and camber of a row with a pitch are the rig's: the pitch, and where fx and fy differ
+        `calibration`, turn them back into those of the pixels, the roll where the row has that of the rig
+        alone.
         """
         if row.map_roll_deg is None or row.width is None or row.height is None or row.alpha is None:
             return None
         theta = math.radians(row.map_roll_deg)
         if calibration is not None and row.pitch_deg is not None and row.image_roll_deg is None:
             theta = math.atan2(math.sin(theta) * calibration.fy / calibration.fx, math.cos(theta))
-        ahead, camber = None, row.camber or 0.0
+        ahead, nearer = None, math.cos(math.radians(row.pitch_deg or 0.0))
         if calibration is not None and row.pitch_deg is not None:
-            ahead, camber = calibration.cx, camber / turns_of(theta, calibration) ** 2
+            ahead, nearer = calibration.cx, nearer * turns_of(theta, calibration)
+        camber = (row.camber or 0.0) / nearer**2
         return cls(RoadModel(theta, row.alpha, camber), row.width, row.height, ahead)
 
     @property

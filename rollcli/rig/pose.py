@@ -110,7 +110,7 @@ def with_pose(estimate: RollEstimate, calibration: Calibration) -> RollEstimate:
         estimate,
         theta=pose.roll,
         ci95=None if estimate.ci95 is None else min(estimate.ci95 * turns, math.pi / 2),
-        camber=None if estimate.camber is None else estimate.camber * turns**2,
+        camber=None if estimate.camber is None else estimate.camber * (turns * math.cos(pose.pitch)) ** 2,
         pitch=pose.pitch,
         pitch_ci95=pitch_ci95,
         height_m=pose.height,
@@ -121,7 +121,8 @@ def with_pose(estimate: RollEstimate, calibration: Calibration) -> RollEstimate:
 def turns_of(theta: float, calibration: Calibration) -> float:
     """Return by how much more than the image the rig turns: tan(roll) = fx / fy tan(theta).
 
-    A place beside the road is nearer to its middle by the same factor than it would be with square pixels.
+    A place beside the road is nearer to its middle by the same factor than it would be with square pixels,
+    in camera heights; and by the cosine of the pitch than it would be below a camera that is level.
     """
     ratio = calibration.fy / calibration.fx
     return ratio / (ratio**2 * math.cos(theta) ** 2 + math.sin(theta) ** 2)
