@@ -83,6 +83,10 @@ RIGS = {
     "nothing": lambda: _columns("nothing"),
     "alike": lambda: {key: each[:5] for key, each in _columns("all alike").items()},
     "failed": lambda: _columns("all alike") | {"status": ["error"] * 60},
+    "on its side": lambda: (
+        _columns("sixteen with a jump")
+        | {"roll_deg": ((SERIES["sixteen with a jump"]()[0] + 178.5) % 180 - 90).tolist()}
+    ),
 }
 NO_VALUES = {"roll_deg": (500.0, -90.1), "roll_ci95_deg": (-1.0,), "pitch_deg": (90.5,), "height_m": (-1.5,)}
 NO_ROWS = (

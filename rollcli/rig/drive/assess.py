@@ -356,9 +356,19 @@ def _assessed(
     nothing = np.full(len(frames.files), np.nan)
     values = np.where(counted, frames.numbers.get(quantity.column, nothing), np.nan)[places]
     halves = frames.numbers.get(quantity.ci_column, nothing)[places]
-    if quantity is ROLL:
-        values = _unwrapped(values)
-    return assess_sequence(values, halves * _TO_SD, quantity.scale)
+    if quantity is not ROLL:
+        return assess_sequence(values, halves * _TO_SD, quantity.scale)
+    found = assess_sequence(_unwrapped(values), halves * _TO_SD)
+    segments = (
+        replace(each, mean=_wrapped(each.mean), begin=_wrapped(each.begin), end=_wrapped(each.end))
+        for each in found.segments
+    )
+    return replace(found, segments=tuple(segments))
+
+
+def _wrapped(roll: Estimate) -> Estimate:
+    """Bring a roll that was unwrapped back to within 90 degrees of level."""
+    return roll if roll.value is None else replace(roll, value=math.remainder(roll.value, ROLL.period))
 
 
 def _unwrapped(rolls: Floats) -> Floats:
