@@ -12,8 +12,10 @@ from rollcli.files.bounded import as_utf8
 from rollcli.files.inputs import stem_of
 from rollcli.files.results import TEXT
 from rollcli.files.storage import read_named
+from rollcli.rig.quantities import BOUNDS
 
 _NEEDED = ("file", "roll_deg")
+_READ = (*_NEEDED, "pitch_deg", "height_m", "curvature_per_m", "focal_px", "baseline_m")
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,9 @@ def _rows(text: str, path: str | Path) -> Iterator[tuple[str, KnownPose]]:
         missing = [name for name in _NEEDED if name not in (lines.fieldnames or ())]
         if missing:
             raise InputError(f"{path}: has no column {', '.join(missing)}: known angles are a CSV with both")
+        twice = [name for name in _READ if (lines.fieldnames or ()).count(name) > 1]
+        if twice:
+            raise InputError(f"{path}: has two columns {', '.join(twice)}: which one is meant?")
         for line in lines:
             where = f"{path}: line {lines.line_num}"
             if None in line or None in line.values():  # the file is cut, or a comma is a decimal point
@@ -116,4 +121,7 @@ def _number(line: Mapping[str, str], name: str, where: str) -> float:
     if not math.isfinite(number):
         kind = "an angle in degrees" if name.endswith("_deg") else "a number"
         raise InputError(f"{where}: {name} is {text!r}, not {kind}")
+    low, high = BOUNDS.get(name, (-math.inf, math.inf))
+    if not low <= number <= high:
+        raise InputError(f"{where}: {text} is no value for {name}, which goes from {low:g} to {high:g}")
     return number
