@@ -232,10 +232,12 @@ def run_rig(options: RigOptions) -> int:
         raise UsageError("--correction and the answer cannot both go to stdout: name a file for one of them")
     check_options(options.gates)
     rig, missing, notes = _assessed(options.results, options)
-    after, changes = None, dict[str, Estimate]()
+    after, changes, rigs = None, dict[str, Estimate](), [rig]
     if options.against is not None:
         after, later, more = _assessed([options.against], options)
         missing, notes = missing or later, [*notes, *more]
+        origins = [base_name(options.against)] * after.count  # frames of both may have one name
+        rigs.append(replace(after, frames=replace(after.frames, origins=origins)))
         changes = {each.name: difference(rig.now(each), after.now(each), each) for each in QUANTITIES}
     pairs = [] if options.correction is None else list(_pairs(rig, options.results))
     reads += calibration_files(options.calibration) + [path for frame, _ in pairs for path in frame.reads()]
@@ -249,7 +251,7 @@ def run_rig(options: RigOptions) -> int:
     if calibration is not None and (health is None or calibration.baseline is None):
         lacks = "no pair was measured" if health is None else "it has no baseline"
         notes.append(f"the calibration tells what misaligned views do to depth; no effect here: {lacks}")
-    checks = run_checks(rig, options.gates, missing, changes.get(ROLL.name))
+    checks = run_checks(rigs, options.gates, missing, changes.get(ROLL.name))
     if not checks and missing:
         notes.append(missing)
     found = Findings(rig, checks, after, changes, health)

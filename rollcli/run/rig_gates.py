@@ -228,25 +228,26 @@ def check_options(gates: GateOptions) -> None:
 
 
 def run_checks(
-    rig: RigAssessment, gates: GateOptions, missing: str = "", change: Estimate | None = None
+    rigs: Sequence[RigAssessment], gates: GateOptions, missing: str = "", change: Estimate | None = None
 ) -> list[Check]:
     """Check what was asked; want of data tells nothing.
 
     Parameters
     ----------
-    rig : RigAssessment
+    rigs : sequence of RigAssessment
+        That of the results, and of a later one; every one of them must pass.
     gates : GateOptions
     missing : str
         Why frames of the run are not there; empty when all are.
     change : Estimate or None
-        Of the roll, against a later result.
+        Of the roll, against the later result.
 
     Returns
     -------
     list of Check
         In the order of the options.
     """
-    checks = list(_checks(rig, gates, change))
+    checks = list(_checks(rigs, gates, change))
     return [Check("complete", None, missing), *checks] if checks and missing else checks
 
 
@@ -261,9 +262,9 @@ def status_of(checks: Sequence[Check]) -> ExitStatus:
 _Told = tuple[bool | None, str]  # `ok` and `message` of a check
 
 
-def _checks(rig: RigAssessment, gates: GateOptions, change: Estimate | None) -> Iterator[Check]:
+def _checks(rigs: Sequence[RigAssessment], gates: GateOptions, change: Estimate | None) -> Iterator[Check]:
     def over_drives(told: Callable[..., Iterator[_Told]], *asked: Any) -> list[_Told]:
-        return [each for drive in rig.drives for each in told(rig, drive, *asked)]
+        return [each for rig in rigs for drive in rig.drives for each in told(rig, drive, *asked)]
 
     height = gates.within if gates.within_height is None else gates.within_height
     for quantity, wanted, within in (
@@ -284,11 +285,11 @@ def _checks(rig: RigAssessment, gates: GateOptions, change: Estimate | None) -> 
         shifts = over_drives(_shifts, gates.max_misalignment)
         yield _worst("max-misalignment", shifts or [(None, "how the views lie: no pair was measured")])
     if gates.min_ok is not None:
-        yield Check("min-ok", *_share(rig, gates.min_ok))
+        yield _worst("min-ok", [_share(rig, gates.min_ok) for rig in rigs])
 
 
 def _worst(name: str, told: Sequence[_Told]) -> Check:
-    """All drives as one check: what is violated, or else what cannot be told."""
+    """All drives of all results as one check: what is violated, or else what cannot be told."""
     for state in (False, None):
         chosen = dict.fromkeys(message for ok, message in told if ok is state)
         if chosen:
@@ -378,7 +379,8 @@ def _shifts(rig: RigAssessment, drive: DriveAssessment, limit: float) -> Iterato
 def _share(rig: RigAssessment, least: float) -> _Told:
     ok = int(rig.frames.ok.sum())
     share = ok / rig.count if rig.count else 0.0
-    message = f"{ok:,} of {rig.count:,} frames are ok, {100 * share:.4g} %"
+    of = f" of {rig.frames.origins[0]}" if len(set(rig.frames.origins)) == 1 else ""
+    message = f"{ok:,} of {rig.count:,} frames{of} are ok, {100 * share:.4g} %"
     if rig.count and share >= least:
         return True, message
     others = [rig.names[place] for place in np.flatnonzero(~rig.frames.ok).tolist()]

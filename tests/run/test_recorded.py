@@ -123,7 +123,7 @@ WRONG = (
 
 
 def _gate(make, asked, missing="", change=None):
-    checks = run_checks(make(), GateOptions(**asked), missing, change)
+    checks = run_checks([make()], GateOptions(**asked), missing, change)
     return [[asdict(each) for each in checks], int(status_of(checks))]
 
 
