@@ -19,14 +19,14 @@ class IntervalTuning:
     factor : float
         On the root of the sum of squares: 0.94 to 0.96 of 180 rendered pairs are covered, and poses of 10 of
         11 real streets at full and at half size agree (tests/benchmarks/bench_pose.py).
-    uneven_pitch, uneven_height : float
-        Of the road's unevenness (`Jackknife.uneven`): radians, and share of the height. Of rendered roads of
-        ISO 8608's classes A to D, without it 0.1 to 0.2 are covered (tests/benchmarks/bench_pose.py).
+    uneven : float
+        Of the road's unevenness (`Jackknife.uneven`) over the distance of the tangent in camera heights:
+        radians. Of rendered roads of ISO 8608's classes A to D, without it 0.1 to 0.2 are covered
+        (tests/benchmarks/bench_pose.py).
     """
 
     factor: float = 0.77
-    uneven_pitch: float = 13.0
-    uneven_height: float = 38.0
+    uneven: float = 32.0
 
 
 TUNING = IntervalTuning()
@@ -168,6 +168,12 @@ def _half_widths(tangent: Tangent, calibration: Calibration, pose: Pose) -> tupl
     """Return those of pitch and height: the tangents that the jackknife leaves, and what uneven ground adds.
 
     Of the height None where nothing is known of the ground.
+
+    Notes
+    -----
+    Uneven ground turns the tangent from what fits the lane ahead: by a height over the distance at which it
+    touches. On rendered roads that it touches 2 to 11 m ahead, the two cross at about twice the root of that
+    distance times the camera's height; that far times the turn, the height is off.
     """
     changes, knife = tangent.changes, tangent.jackknife
     if changes is None or knife is None:
@@ -178,8 +184,10 @@ def _half_widths(tangent: Tangent, calibration: Calibration, pose: Pose) -> tupl
         for nearer, steeper, turned in changes.tolist()
     ]
     noise = TUNING.factor * math.hypot(*(each.pitch - pose.pitch for each in moved))
-    pitch = min(math.hypot(noise, TUNING.uneven_pitch * knife.uneven), math.pi / 2)
+    near = abs((disparity + calibration.doffs) * math.cos(pose.pitch) / (calibration.fy * slope))
+    uneven = TUNING.uneven * knife.uneven
+    pitch = min(math.hypot(noise, uneven * near), math.pi / 2)
     if pose.height is None or not math.isfinite(knife.uneven):
         return pitch, None
     noise = TUNING.factor * math.hypot(*(each.height - pose.height for each in moved if each.height))
-    return pitch, math.hypot(noise, TUNING.uneven_height * knife.uneven * pose.height)
+    return pitch, math.hypot(noise, 2 * math.sqrt(near) * uneven * pose.height)
