@@ -93,14 +93,13 @@ class FittedRoad:
         """
         if row.map_roll_deg is None or row.width is None or row.height is None or row.alpha is None:
             return None
-        theta = math.radians(row.map_roll_deg)
-        if calibration is not None and row.pitch_deg is not None and row.image_roll_deg is None:
-            theta = math.atan2(math.sin(theta) * calibration.fy / calibration.fx, math.cos(theta))
-        ahead, nearer = None, math.cos(math.radians(row.pitch_deg or 0.0))
+        theta, pitch = math.radians(row.map_roll_deg), math.radians(row.pitch_deg or 0.0)
+        ahead, nearer = None, math.cos(pitch)
         if calibration is not None and row.pitch_deg is not None:
+            if row.image_roll_deg is None:
+                theta = math.atan2(math.sin(theta) * calibration.fy / calibration.fx, math.cos(theta))
             ahead, nearer = calibration.cx, nearer * turns_of(theta, calibration)
-        camber = (row.camber or 0.0) / nearer**2
-        return cls(RoadModel(theta, row.alpha, camber), row.width, row.height, ahead)
+        return cls(RoadModel(theta, row.alpha, (row.camber or 0.0) / nearer**2), row.width, row.height, ahead)
 
     @property
     def middle(self) -> tuple[float, float]:

@@ -185,9 +185,8 @@ def _half_widths(tangent: Tangent, calibration: Calibration, pose: Pose) -> tupl
     ]
     noise = TUNING.factor * math.hypot(*(each.pitch - pose.pitch for each in moved))
     near = abs((disparity + calibration.doffs) * math.cos(pose.pitch) / (calibration.fy * slope))
-    uneven = TUNING.uneven * knife.uneven
-    pitch = min(math.hypot(noise, uneven * near), math.pi / 2)
+    pitch = min(math.hypot(noise, TUNING.uneven * knife.uneven * near), math.pi / 2)
     if pose.height is None or not math.isfinite(knife.uneven):
         return pitch, None
     noise = TUNING.factor * math.hypot(*(each.height - pose.height for each in moved if each.height))
-    return pitch, math.hypot(noise, 2 * math.sqrt(near) * uneven * pose.height)
+    return pitch, math.hypot(noise, 2 * TUNING.uneven * knife.uneven * math.sqrt(near) * pose.height)

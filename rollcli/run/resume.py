@@ -58,8 +58,7 @@ CONVENTIONS = {
     "pitch_deg": "angle of the optical axis to the road near ahead, degrees; positive: looks down",
     "height_m": "of the left camera over the road near ahead, metres",
     "camber": "curvature across the road, 1/(camera height): x camera heights to the side, the surface is "
-    "higher by camber/2 x^2 camera heights; negative: crowned; 0: it may be noise; without pitch_deg as of a "
-    "level camera",
+    "higher by camber/2 x^2 camera heights; negative: crowned; 0: it may be noise; no pitch_deg: as if level",
     "right_lower_px, right_clockwise_deg, right_larger_percent, right_twist_px": "how the right view lay "
     "against the left one, px of the size matched at; twist: vertical shift in the corners",
     "alignment": "medians of these over the pairs",

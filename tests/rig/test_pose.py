@@ -60,8 +60,7 @@ def test_the_interval_of_the_roll_is_turned_as_the_roll_is():
     posed = with_pose(estimate, calibration)
     assert abs(ratio - 1) > 0.3
     assert posed.ci95 == pytest.approx(ratio * estimate.ci95, rel=1e-3)
-    wide = dataclasses.replace(estimate, ci95=math.pi / 2)
-    assert with_pose(wide, calibration).ci95 == math.pi / 2  # there are no other rolls
+    assert with_pose(dataclasses.replace(estimate, ci95=math.pi / 2), calibration).ci95 == math.pi / 2
     assert posed.tangent.theta == estimate.theta
 
 

@@ -83,10 +83,7 @@ RIGS = {
     "nothing": lambda: _columns("nothing"),
     "alike": lambda: {key: each[:5] for key, each in _columns("all alike").items()},
     "failed": lambda: _columns("all alike") | {"status": ["error"] * 60},
-    "on its side": lambda: (
-        _columns("sixteen with a jump")
-        | {"roll_deg": ((SERIES["sixteen with a jump"]()[0] + 178.5) % 180 - 90).tolist()}
-    ),
+    "on its side": lambda: _columns("brief") | {"roll_deg": [88.0] * 20 + [-89.0] * 20},
 }
 NO_VALUES = {"roll_deg": (500.0, -90.1), "roll_ci95_deg": (-1.0,), "pitch_deg": (90.5,), "height_m": (-1.5,)}
 NO_ROWS = (
@@ -222,10 +219,9 @@ def _posed(name, calibration):
     found = made(lambda: with_pose(estimate_roll(POSED[name](), request), calibration))
     if isinstance(found, str):
         return found
-    numbers = found.to_dict()
     shown = ("status", "roll", "pitch", "height", "mess")
     return {
-        **{key: value for key, value in numbers.items() if key.startswith(shown)},
+        **{key: value for key, value in found.to_dict().items() if key.startswith(shown)},
         "horizon": horizon_row(found.tangent, calibration),
         "exact": taken_as_exact(calibration.for_size(240, 160), found.pitch or 0.1, found.height_m),
     }

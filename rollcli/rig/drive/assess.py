@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import UsageError
 from rollcli.rig.drive.posterior import Estimate, Flags, Floats
-from rollcli.rig.drive.quantity import SequenceAssessment, assess_sequence
+from rollcli.rig.drive.quantity import Segment, SequenceAssessment, assess_sequence
 from rollcli.rig.quantities import ALIGNMENT, BOUNDS, COLUMNS, QUANTITIES, ROLL, SIZE, Quantity
 
 AUTO, NONE = "auto", "none"
@@ -356,19 +356,17 @@ def _assessed(
     nothing = np.full(len(frames.files), np.nan)
     values = np.where(counted, frames.numbers.get(quantity.column, nothing), np.nan)[places]
     halves = frames.numbers.get(quantity.ci_column, nothing)[places]
-    if quantity is not ROLL:
-        return assess_sequence(values, halves * _TO_SD, quantity.scale)
-    found = assess_sequence(_unwrapped(values), halves * _TO_SD)
-    segments = (
-        replace(each, mean=_wrapped(each.mean), begin=_wrapped(each.begin), end=_wrapped(each.end))
-        for each in found.segments
-    )
-    return replace(found, segments=tuple(segments))
+    if quantity is ROLL:
+        values = _unwrapped(values)
+    found = assess_sequence(values, halves * _TO_SD, quantity.scale)
+    return replace(found, segments=tuple(_wrapped(each, quantity) for each in found.segments))
 
 
-def _wrapped(roll: Estimate) -> Estimate:
-    """Bring a roll that was unwrapped back to within 90 degrees of level."""
-    return roll if roll.value is None else replace(roll, value=math.remainder(roll.value, ROLL.period))
+def _wrapped(segment: Segment, quantity: Quantity) -> Segment:
+    """Bring values that were unwrapped back to within half a period of 0."""
+    parts = (segment.mean, segment.begin, segment.end)
+    values = (difference(Estimate(0.0, 0.0), each, quantity) for each in parts)
+    return Segment(segment.first, segment.last, segment.used, *values)
 
 
 def _unwrapped(rolls: Floats) -> Floats:
