@@ -200,7 +200,7 @@ def estimate_pair(
     allowed = None if mask is None else usable_of(mask)
     if allowed is not None and not allowed.any():
         raise UsageError("the mask leaves no pixel of the map: give an array that is not all zero")
-    source = matched_source(left, right, stereo or StereoOptions(), road_finder(allowed, request))
+    source = matched_source((left, right), stereo or StereoOptions(), road_finder(allowed, request), rig)
     rig = source.calibrated(rig)
     seen: dict[str, Any] = {} if rig is None else {"middle": rig.cx, "doffs": rig.doffs}
     request = replace(request, slope_error=source.slope_error, **seen)

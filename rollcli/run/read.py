@@ -32,6 +32,7 @@ from rollcli.stereo.options import StereoOptions
 if TYPE_CHECKING:
     from rollcli.stereo.along_road import FindRoad
     from rollcli.stereo.match import StereoMatch
+    from rollcli.stereo.views import Views
 
 
 def region_mask(mask: str | None, options: FramesOptions, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
@@ -292,7 +293,7 @@ def _match(frame: Frame, options: FramesOptions) -> Source:
     left, right = read_views(frame, options)
     allowed = region_mask(frame.mask, options, matched_shape(left.shape, options.stereo.downscale))
     find_road = road_finder(allowed, options.method.request())
-    source = matched_source(left, right, options.stereo, find_road)
+    source = matched_source((left, right), options.stereo, find_road, frame.calibration)
     if not np.any(source.disparity):
         raise InputError(f"{frame.file}: no pixel could be matched with the right image")
     drawn_on = options.images.road_mask is not None or options.images.heights_preview is not None
@@ -324,14 +325,14 @@ _MOST_SEARCHED = 0.75  # of the width: hardly a road is matched in what is left
 
 
 def matched_source(
-    left: NDArray[Any], right: NDArray[Any], options: StereoOptions, find_road: "FindRoad | None"
+    views: "Views", options: StereoOptions, find_road: "FindRoad | None", rig: Calibration | None
 ) -> Source:
     """Match a pair for the estimate; see `match_pair`."""
     from rollcli.stereo.match import MUCH_AT_END, match_pair
 
-    match = match_pair(left, right, options, find_road)
+    match = match_pair(*views, options, find_road, rig)
+    height, width = views[0].shape[:2]
     searched = (match.min_disparity, match.min_disparity + match.num_disparities - 1)
-    height, width = left.shape[:2]
     at_end = f"{match.end_fraction:.0%} of the map lies at the end of the searched range"
     short = f"{at_end}; use a larger --num-disparities" if match.end_fraction > MUCH_AT_END else ""
     if searched[1] > _MOST_SEARCHED * (columns := match.disparity.shape[1]):

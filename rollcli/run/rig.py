@@ -257,7 +257,7 @@ def run_rig(options: RigOptions) -> int:
     found = Findings(rig, checks, after, changes, health)
     texts = [(options.output, FORMATS[options.format](found))]
     if options.correction is not None:
-        rows = None if health is None else rows_of_drive(pairs)
+        rows = None if health is None else rows_of_drive(pairs, health.axis)
         texts.append((options.correction, correction_text(health, rows, options.results)))
         if rows is None:
             options.running.note(f"{options.correction}: {NO_COLUMNS}")
@@ -275,11 +275,11 @@ _PAIRS = 24  # matched again, a few seconds: 8 of rendered roads tell a scale to
 _FEWEST = 4
 
 
-def rows_of_drive(pairs: Iterable[tuple[Frame, FramesOptions]]) -> DriveRows | None:
+def rows_of_drive(pairs: Iterable[tuple[Frame, FramesOptions]], axis: Sequence[float]) -> DriveRows | None:
     """Match pairs of a drive again, and put together what their rows say.
 
     One pair of an empty road cannot tell a right view that is larger from rows that are bent; the pairs of a
-    drive can, for its rig is one since its last jump.
+    drive can, for its rig is one since its last jump. `axis`: see `column_support`.
 
     Returns
     -------
@@ -298,7 +298,7 @@ def rows_of_drive(pairs: Iterable[tuple[Frame, FramesOptions]]) -> DriveRows | N
     same = [each for each, size in zip(found, sizes, strict=True) if size == sizes[-1]]
     if len(same) < _FEWEST:
         return None
-    columns = column_support(ColumnEvidence.of_drive([each.evidence for each in same]))
+    columns = column_support(ColumnEvidence.of_drive([each.evidence for each in same]), axis)
     return DriveRows(columns, float(np.median([each.misalignment.curve for each in same])))
 
 

@@ -82,6 +82,11 @@ class Health:
         return Misalignment.of_values([each.value or 0.0 for each in self.parts], height, width)
 
     @property
+    def axis(self) -> tuple[float, float]:
+        """The right view's principal point from the middle, px; the middle where there is no calibration."""
+        return (0.0, 0.0) if self.calibration is None else self.calibration.right_axis(*self.size)
+
+    @property
     def verdict(self) -> str:
         """One of three: level, level enough for rollcli, recalibrate; by the shift that is surely there."""
         surely = (self.reach.value or 0.0) - (self.reach.ci95 or 0.0)

@@ -264,11 +264,11 @@ def correction_text(health: Health | None, rows: DriveRows | None, results: Sequ
     if health is None:
         raise UsageError(f"{results[0]}: no pair was measured, so there is no correction to write")
     width, height = health.size
-    axis, about = (0.0, 0.0), _MIDDLE
-    if health.calibration is not None:
-        axis, about = health.calibration.right_axis(width, height), "the principal point"
+    axis, about = health.axis, _MIDDLE if health.calibration is None else "the principal point"
     lies = health.misalignment
-    larger = lies.scale if rows is None else rows.columns.scale
+    larger = lies.scale
+    if rows is not None:
+        larger = rows.columns.scale + 2 * rows.columns.twist * axis[0] + rows.columns.pitch * axis[1]
     values = {
         **alignment_values(health),
         "width": width,

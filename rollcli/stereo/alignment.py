@@ -9,7 +9,7 @@ import numpy as np
 
 from rollcli.estimator.moments import Singles
 from rollcli.stereo import row_fit, sampling
-from rollcli.stereo.misalignment import LEVEL, TOLERANCE, ColumnSupport, Misalignment
+from rollcli.stereo.misalignment import LEVEL, TOLERANCE, Misalignment
 from rollcli.stereo.sampling import BLOCK
 from rollcli.stereo.views import Map, View, Views, resampled, resized, shrink_both, size_factor
 
@@ -61,11 +61,6 @@ class Measured:
     def evidence(self) -> row_fit.ColumnEvidence:
         """What the rows say of the columns; worked out when it is asked for: most measurements need none."""
         return row_fit.column_evidence(self.rows, self.spread)
-
-    @cached_property
-    def support(self) -> ColumnSupport:
-        """What of it is believed to be in the columns, too."""
-        return row_fit.column_support(self.evidence)
 
     def resized(self, factor: float) -> "Measured":
         """Return this measurement, of views `factor` times as large."""

@@ -1,7 +1,7 @@
 """Disparity maps from stereo pairs: range found, views levelled, then one match."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 from rollcli.estimator.road.find import road_plane
+from rollcli.rig.calibration import Calibration
 from rollcli.stereo.alignment import Approach, Measured, SmallViews, level, textured_share
 from rollcli.stereo.along_road import FindRoad, Levelled
 from rollcli.stereo.correction import Correction
@@ -19,6 +20,7 @@ from rollcli.stereo.first_look import FirstLook, first_look, look_for_range
 from rollcli.stereo.misalignment import LEVEL, NO_SUPPORT, TOLERANCE, ColumnSupport, Misalignment, Tolerance
 from rollcli.stereo.options import StereoOptions as StereoOptions
 from rollcli.stereo.refinement import refined
+from rollcli.stereo.row_fit import column_support
 from rollcli.stereo.sgbm import NARROWEST, usable_range
 from rollcli.stereo.views import Map, as_bright, as_clear, as_sharp, prepare_views, shows_nothing, shrink
 
@@ -219,18 +221,8 @@ def compute_disparity(
     >>> float(np.median(disparity[disparity > 0]))
     12.0
     """
-    options = StereoOptions(
-        num_disparities,
-        min_disparity,
-        block_size,
-        mode,
-        uniqueness,
-        speckle_size,
-        speckle_range,
-        downscale,
-        align,
-        vertical_offset,
-    )
+    search = num_disparities, min_disparity, block_size, mode, uniqueness, speckle_size, speckle_range
+    options = StereoOptions(*search, downscale, align, vertical_offset)
     return match_pair(left, right, options, road_plane).whole
 
 
@@ -239,6 +231,7 @@ def match_pair(
     right: NDArray[Any],
     options: StereoOptions,
     find_road: FindRoad | None = None,
+    rig: Calibration | None = None,
     look: FirstLook | None = None,
 ) -> StereoMatch:
     """Match a rectified pair, and keep all that was found on the way.
@@ -250,6 +243,9 @@ def match_pair(
     find_road : callable, optional
         Finds the road's plane in a smaller map of the pair. The road is then matched along it, and what lies
         beside and above it at a third of the size; without it all is matched at full size.
+    rig : Calibration, optional
+        Of the views as they are given: a yaw or a pitch of the right camera turns its columns about the
+        principal point.
     look : FirstLook, optional
         At the pair, where there was one.
 
@@ -289,8 +285,9 @@ def match_pair(
     end_fraction = _share_at_end(found.disparity, pair)
     grows = usable_range(2 * count, first, width, options.block_size) > count
     if grows and end_fraction > MUCH_AT_END and options.num_disparities is None and not again:
-        return match_pair(left, right, options, find_road, replace(look, range=first + 2 * count))
-    support, lies = found.support, found.left_to_refine(small.shape)
+        return match_pair(left, right, options, find_road, rig, replace(look, range=first + 2 * count))
+    support = found.support(_axis(rig, given[0].shape, options.downscale))
+    lies = found.left_to_refine(small.shape)
 
     def finished(disparity: Map) -> Map:
         return _with_believed_columns(refined(disparity, views, lies), corrected, support)
@@ -309,6 +306,18 @@ def match_pair(
         doubt=found.doubt or _doubt_of_columns(support),
         match_whole=lambda: disparity if find_road is None else finished(pair.matched(whole=True)),
     )
+
+
+def _axis(rig: Calibration | None, shape: tuple[int, ...], downscale: float) -> tuple[float, float]:
+    """Return where the right camera's principal point is from the middle, px of the size matched at.
+
+    `shape` is that of the views as they are given.
+    """
+    if rig is None:
+        return 0.0, 0.0
+    height, width = shape
+    right, below = rig.for_size(width, height).right_axis(width, height)
+    return right / downscale, below / downscale
 
 
 def _look_at(small: SmallViews, options: StereoOptions, told: Correction) -> FirstLook:
@@ -344,14 +353,13 @@ class _Matched(NamedTuple):
     doubt: str = ""
     told: ColumnSupport | None = None
 
-    @property
-    def support(self) -> ColumnSupport:
-        """What of the correction is in the columns."""
+    def support(self, axis: Sequence[float]) -> ColumnSupport:
+        """Tell what of the correction is in the columns; `axis` as in `column_support`."""
         if self.corrected == LEVEL:
             return NO_SUPPORT
         if self.told is not None:
             return self.told
-        return NO_SUPPORT if self.measured is None else self.measured.support
+        return NO_SUPPORT if self.measured is None else column_support(self.measured.evidence, axis)
 
     def left_to_refine(self, shape: tuple[int, ...]) -> Misalignment:
         """Return how views of this shape lie, also where that was too little to level them for."""

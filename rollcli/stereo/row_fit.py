@@ -306,20 +306,24 @@ def column_evidence(rows: MeasuredRows, spread: float) -> ColumnEvidence:
     )
 
 
-def column_support(seen: ColumnEvidence) -> ColumnSupport:
+def column_support(seen: ColumnEvidence, axis: Sequence[float] = (0.0, 0.0)) -> ColumnSupport:
     """Tell what of a scale, a twist and an offset is believed to be in the columns, too.
 
     Every choice of scale, tilt, bend and pitch explains the blocks, with what is known of rigs; the answer is
-    the mean over them, each as likely as it explains what was seen.
+    the mean over them, each as likely as it explains what was seen. `axis` is the right view's principal
+    point from the middle, px: a yaw or a pitch turns about it, which is in part a scale about the middle.
     """
     (x, y), (height, width) = seen.reach, seen.shape
     lens = seen.unevenness + (BELIEF.least * y) ** 2
+    right, below = axis[0] / seen.factor, axis[1] / seen.factor
+    from_axis = np.eye(4)
+    from_axis[0, 3] = -2 * below
     scale, pitch = _mean_over_causes(
-        seen.information,
-        seen.told,
+        from_axis.T @ seen.information @ from_axis,
+        from_axis.T @ (seen.told + seen.twist * right * seen.information[0]),
         np.array([lens / y**2, 0, 0, lens / y**4]),
         seen.offset / np.square(np.array(BELIEF.focal) * width),
-        seen.rotation,
+        seen.rotation + seen.twist * below,
     )
     yaw, skew = np.square(np.array([BELIEF.yaw, BELIEF.skew]) / (_FOCAL * width))
     # how many times likelier the shapes are those of a lens than none; a yaw makes none
@@ -330,7 +334,8 @@ def column_support(seen: ColumnEvidence) -> ColumnSupport:
     twist, twist_error = _yaw_of_twist(seen.twist, error, yaw, skew, ratio)
     parts = scale[1], 2 * twist_error * height * _ROAD_ACROSS, pitch[1] * height * _ROAD_DOWN
     open_slope = float(np.linalg.norm(parts))
-    return ColumnSupport(scale[0], twist, pitch[0], open_slope, parts[2]).resized(seen.factor)
+    larger = scale[0] - 2 * twist * right - pitch[0] * below
+    return ColumnSupport(larger, twist, pitch[0], open_slope, parts[2]).resized(seen.factor)
 
 
 def _yaw_of_twist(twist: float, error: float, yaw: float, skew: float, ratio: float) -> tuple[float, float]:

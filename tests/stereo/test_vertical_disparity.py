@@ -201,11 +201,10 @@ def test_rows_curve_as_far_as_their_offset_may_be_a_pitch(offset, share):
     assert lies.offset == pytest.approx(offset + (1 - share) * curve * 180**2 / 3, abs=0.03)
 
 
-def support_of(field, **street):
+def support_of(field, axis=(0.0, 0.0), **street):
     seen = blocks_of(np.random.default_rng(5), field, **street)
-    return row_fit.column_support(
-        row_fit.column_evidence(row_fit.MeasuredRows(seen, LEVEL, (375, 1242)), 0.1)
-    )
+    rows = row_fit.MeasuredRows(seen, LEVEL, (375, 1242))
+    return row_fit.column_support(row_fit.column_evidence(rows, 0.1), axis)
 
 
 @pytest.mark.parametrize("scale", [-0.005, -0.002, 0.001, 0.002, 0.005])
@@ -257,7 +256,8 @@ def test_rows_that_are_skewed_alone_are_in_the_error():
 def test_an_even_twist_is_a_yaw_and_an_uneven_one_mostly_a_lens():
     yaw = np.radians(0.2) / 720
     even = support_of(lambda x, y, near: yaw * x * y)
-    assert even.twist == pytest.approx(yaw, rel=0.1)
+    aside = support_of(lambda x, y, near: yaw * (x - 120) * (y - 30), axis=(120.0, 30.0))
+    assert (even.twist, aside.twist, aside.scale) == pytest.approx((yaw, yaw, -240 * yaw), rel=0.1)
     lens = support_of(lambda x, y, near: yaw * x * y + 0.2 * (x / 600) ** 2 - 0.2 * (y / 180) ** 3)
     assert abs(lens.twist) < 0.5 * yaw
     assert lens.error > even.error
