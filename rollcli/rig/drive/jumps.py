@@ -86,8 +86,11 @@ class _Search:
 
     def _scored(self, starts: Sequence[int], drift: bool) -> Found:
         fit = self._likelihood.fit(self.cells.design(starts, drift))
-        penalty = TUNING.jump_penalty * len(starts) + TUNING.drift_penalty * drift
-        return Found(tuple(starts), drift, fit.evidence - penalty)
+        return Found(tuple(starts), drift, fit.evidence - self._penalty(len(starts), drift))
+
+    @staticmethod
+    def _penalty(jumps: int, drift: bool) -> float:
+        return TUNING.jump_penalty * jumps + TUNING.drift_penalty * drift
 
     def _proposals(self, found: Found) -> list[tuple[int, ...]]:
         """Return what is there with the step that tells most, and with the two that do."""
@@ -114,7 +117,10 @@ class _Search:
         return [tuple(sorted([*found.starts, *(int(first[at]) for at in each)])) for each in places]
 
     def _lasts(self, found: Found, start: int) -> bool:
-        """Tell whether the level after a jump stays changed, rather than being a kick that fades."""
+        """Tell whether the level after a jump stays changed, rather than being a kick that fades.
+
+        One that returns too near to the end to be told has stayed changed for as long as can be told.
+        """
         others = [each for each in found.starts if each != start]
         after = (self.cells.centres - start) / self.cells.width
         design = self.cells.design(others, found.drift)
@@ -124,9 +130,11 @@ class _Search:
         if fading[-1] > _LEFT:
             return True
         kicked = self._likelihood.fit(np.column_stack([design, fading]))
-        return found.score >= kicked.evidence - TUNING.jump_penalty * len(found.starts) - (
-            TUNING.drift_penalty * found.drift
-        )
+        fades = kicked.evidence - self._penalty(len(found.starts), found.drift)
+        first = self.cells.first
+        untold = first[first > max(self.cells.frames - self._gap, found.starts[-1])].tolist()
+        returned = (self._scored((*found.starts, each), found.drift) for each in untold)
+        return found.score >= fades or any(each.score >= fades for each in returned)
 
 
 def _placed(series: Series, found: Found, whole: Likelihood) -> list[int]:

@@ -50,6 +50,14 @@ def test_a_jump_too_near_the_end_is_not_taken_for_one_before_it(frames, behind):
     assert not assess_sequence(*drive(0, frames, phi=0.0, sd=0.05, jump=1.0, at=frames - behind)).jumps
 
 
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("frames", [500, 1000])
+def test_a_jump_that_goes_back_too_near_the_end_to_be_told_is_a_jump(frames, seed):
+    values, errors = drive(seed, frames, sd=0.15, jump=1.0, at=400)
+    values[-frames // 50 :] -= 1.0
+    assert 390 <= assess_sequence(values, errors).jumps[0].frame <= 410
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_drift_is_found_and_is_no_jump(seed):
     found = assess_sequence(*drive(seed, 4000, drift=1.0, sd=0.1))
