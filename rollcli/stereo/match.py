@@ -20,7 +20,7 @@ from rollcli.stereo.first_look import FirstLook, first_look, look_for_range
 from rollcli.stereo.misalignment import LEVEL, NO_SUPPORT, TOLERANCE, ColumnSupport, Misalignment, Tolerance
 from rollcli.stereo.options import StereoOptions as StereoOptions
 from rollcli.stereo.refinement import refined
-from rollcli.stereo.row_fit import column_support
+from rollcli.stereo.row_fit import column_support, support_of_level
 from rollcli.stereo.sgbm import NARROWEST, usable_range
 from rollcli.stereo.views import Map, as_bright, as_clear, as_sharp, prepare_views, shows_nothing, shrink
 
@@ -132,8 +132,8 @@ class StereoMatch:
         Whether the road was to be matched along its plane, and too little of any was found: all below the
         horizon was then matched over the whole range.
     slope_error : float
-        Standard deviation of the slope along the rows that levelling left in the disparities, px per px; 0 if
-        nothing was measured and corrected.
+        Standard deviation of the slope along the rows that levelling left in the disparities, px per px, also
+        where the views were level enough to be left as they are; 0 if nothing was measured.
     doubt : str
         Why the views may not be level now; empty if there is no reason.
     match_whole : callable
@@ -286,7 +286,7 @@ def match_pair(
     grows = usable_range(2 * count, first, width, options.block_size) > count
     if grows and end_fraction > MUCH_AT_END and options.num_disparities is None and not again:
         return match_pair(left, right, options, find_road, rig, replace(look, range=first + 2 * count))
-    support = found.support(_axis(rig, given[0].shape, options.downscale))
+    support = found.support(_axis(rig, given[0].shape, options.downscale), height)
     lies = found.left_to_refine(small.shape)
 
     def finished(disparity: Map) -> Map:
@@ -353,13 +353,15 @@ class _Matched(NamedTuple):
     doubt: str = ""
     told: ColumnSupport | None = None
 
-    def support(self, axis: Sequence[float]) -> ColumnSupport:
-        """Tell what of the correction is in the columns; `axis` as in `column_support`."""
-        if self.corrected == LEVEL:
-            return NO_SUPPORT
-        if self.told is not None:
+    def support(self, axis: Sequence[float], height: int) -> ColumnSupport:
+        """Tell what is in the columns of views of this height; `axis` as in `column_support`."""
+        if self.corrected != LEVEL and self.told is not None:
             return self.told
-        return NO_SUPPORT if self.measured is None else column_support(self.measured.evidence, axis)
+        if self.measured is None or (self.corrected == LEVEL and self.doubt):
+            return NO_SUPPORT
+        if self.corrected == LEVEL:
+            return support_of_level(self.measured.misalignment, self.measured.errors, height)
+        return column_support(self.measured.evidence, axis)
 
     def left_to_refine(self, shape: tuple[int, ...]) -> Misalignment:
         """Return how views of this shape lie, also where that was too little to level them for."""
@@ -455,7 +457,7 @@ def _with_believed_columns(disparity: Map, matched: Misalignment, support: Colum
     support : ColumnSupport
         What is in the columns.
     """
-    if support == NO_SUPPORT and not matched.scale:
+    if matched == LEVEL or (support == NO_SUPPORT and not matched.scale):
         return disparity
     height, width = disparity.shape
     u = np.arange(width, dtype=np.float32) - np.float32((width - 1) / 2)

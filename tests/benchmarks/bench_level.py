@@ -52,6 +52,7 @@ WAYS = [  # degrees clockwise, share larger, pixels lower
     (0.8, 0.008, -4.0),
     (0.5, -0.006, -2.0),
 ]
+SLIGHTLY_LARGER, SLIGHT_YAWS_DEG = (0.0002, -0.0003), (0.03, -0.05)  # most of them count as level
 YAWS_DEG, PITCHES_DEG, BENDS, LEFT_DEG = (0.1, -0.3), (0.1, 0.3), (0.002, -0.002), (0.3, -0.3)
 GOOD_DEG = 0.1
 NOISE = 4.0  # grey levels; the renderer's default is 1.5
@@ -97,6 +98,10 @@ def report(kind: str, pairs: list[Views]) -> None:
     print(f"{kind}: {len(pairs)} pairs, {corrected} corrected untouched; {len(known)} to compare with")
     ways = {
         "turned, larger, lower": [partial(warped, clockwise_deg=a, larger=b, lower=c) for a, b, c in WAYS],
+        "nearly level": [
+            *(partial(warped, clockwise_deg=0.0, larger=each, lower=0.0) for each in SLIGHTLY_LARGER),
+            *(partial(seen_turned, yaw_deg=each) for each in SLIGHT_YAWS_DEG),
+        ],
         "yaw": [partial(seen_turned, yaw_deg=each) for each in YAWS_DEG],
         "pitch": [partial(seen_turned, pitch_deg=each) for each in PITCHES_DEG],
         "bent rows": [partial(bent, share=each) for each in BENDS],
