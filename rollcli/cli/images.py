@@ -52,13 +52,15 @@ def derotate(options: records.DerotateOptions) -> int:
 @shared.save_as_option
 @option("--preview", DIR, section="Output")
 @shared.stereo_options
+@shared.calibration_options
 @shared.cluster_options
 def disparity(options: records.DisparityOptions) -> int:
     """Match rectified stereo pairs with OpenCV SGBM: one disparity map a pair, named after the left image.
 
     Images are PNG, JPEG, TIFF, BMP, PGM or PPM, of 8 or 16 bits, grey or colour. An image without a partner
     is an error that names it, before anything runs. INPUTS are images or videos that hold both views
-    (--side-by-side), or bags (--left-topic, --right-topic).
+    (--side-by-side), or bags (--left-topic, --right-topic). With a calibration, a right camera that is turned
+    turns its columns about the principal point, else about the middle.
 
     Examples
     --------

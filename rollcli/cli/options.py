@@ -39,8 +39,8 @@ _HORIZON = Needs(
     lambda ctx: not ctx.params.get("figure") or ctx.params["encoding"] == "depth", "a figure shows no horizon"
 )
 _BASELINE = Needs(
-    lambda ctx: ctx.command.name != "vdisparity" or ctx.params["encoding"] == "depth",
-    "the horizon does not depend on it; only --encoding depth needs it",
+    lambda ctx: ctx.command.name not in ("vdisparity", "disparity") or ctx.params.get("encoding") == "depth",
+    "horizon and levelling do not depend on it; only depth maps need it",
 )
 _STAMPS = Needs(lambda ctx: ctx.params["left_topic"], "only views of a bag are paired by their stamps")
 _MEASURED = Needs(
@@ -177,7 +177,7 @@ cluster_options = Section("running", "Running", records.RunningOptions).of(
 
 calibration_options = Section(
     "calibration",
-    "Calibration of the rectified pair, for pitch, height, horizon and depth maps",
+    "Calibration of the rectified pair, for pitch, height, horizon, levelling and depth maps",
     CalibrationOptions,
     [_HORIZON],
 ).of(

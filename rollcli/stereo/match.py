@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 from rollcli.estimator.road.find import road_plane
-from rollcli.rig.calibration import Calibration
+from rollcli.rig.calibration import Calibration, require_calibration
 from rollcli.stereo.alignment import Approach, Measured, SmallViews, level, textured_share
 from rollcli.stereo.along_road import FindRoad, Levelled
 from rollcli.stereo.correction import Correction
@@ -186,6 +186,7 @@ def compute_disparity(
     downscale: float = _DEFAULT.downscale,
     align: str | os.PathLike[str] = "auto",
     vertical_offset: float | None = _DEFAULT.vertical_offset,
+    calibration: Calibration | None = None,
 ) -> Map:
     """Return the disparity map of a rectified pair.
 
@@ -195,6 +196,9 @@ def compute_disparity(
         uint8 or uint16, grey or BGR, of equal size.
     num_disparities, min_disparity, block_size, mode, uniqueness, speckle_size, speckle_range, downscale
         See `StereoOptions`; so for `align` and `vertical_offset`.
+    calibration : Calibration, optional
+        Of the pair: a right camera that is turned turns its columns about the principal point, else about the
+        middle.
 
     Returns
     -------
@@ -223,7 +227,8 @@ def compute_disparity(
     """
     search = num_disparities, min_disparity, block_size, mode, uniqueness, speckle_size, speckle_range
     options = StereoOptions(*search, downscale, align, vertical_offset)
-    return match_pair(left, right, options, road_plane).whole
+    require_calibration(calibration)
+    return match_pair(left, right, options, road_plane, calibration).whole
 
 
 def match_pair(

@@ -15,7 +15,7 @@ from rollcli.simulate import dataset
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
-from tests.odd_views import seen_by, seen_rolled
+from tests.odd_views import seen_by, seen_rolled, seen_turned
 from tests.run_cli import rollcli, rows_of, write_views
 
 VIEWS = ("--left", "left", "--right", "right")
@@ -33,8 +33,8 @@ def pair(tmp_path_factory):
     return folder, frame.left, right
 
 
-def row_of(folder, *inputs):
-    done = rollcli("estimate", *inputs, "--calib", "calib.txt", "-o", "rolls.csv", "--overwrite", cwd=folder)
+def row_of(folder, *inputs, calib=("--calib", "calib.txt")):
+    done = rollcli("estimate", *inputs, *calib, "-o", "rolls.csv", "--overwrite", cwd=folder)
     assert done.status == 0
     return rows_of((folder / "rolls.csv").read_text())[0]
 
@@ -54,6 +54,21 @@ def test_a_pair_and_its_map_give_the_same_row(pair, form):
     assert of_map["status"] == of_pair["status"]
     for column in ("roll_deg", "roll_ci95_deg", "pitch_deg", "height_m"):
         assert float(of_map[column]) == pytest.approx(float(of_pair[column]), abs=0.01)
+
+
+def test_a_yaw_is_about_the_principal_point_in_a_pair_and_in_its_map(tmp_path):
+    """Views without their right fifth: a yaw about the middle would turn the road by 0.1 degrees."""
+    spec = FrameSpec(scene="open", roll=math.radians(3), seed=12, colour=False, size=(800, 600))
+    frame = render_frame(spec)
+    right = seen_turned(frame.right, yaw_deg=0.3)
+    write_views(tmp_path, "a.png", frame.left[60:540, :640], right[60:540, :640])
+    axis = ("--focal", str(spec.focal), "--principal-point", "399.5,239.5")
+    assert rollcli("disparity", *VIEWS, *axis, "-o", "maps", "--save-as", "tiff", cwd=tmp_path).status == 0
+
+    of_pair, of_map = (row_of(tmp_path, *inputs, *axis, calib=()) for inputs in (VIEWS, ("maps",)))
+
+    assert float(of_pair["roll_deg"]) == pytest.approx(3, abs=0.06)
+    assert float(of_map["roll_deg"]) == pytest.approx(float(of_pair["roll_deg"]), abs=0.01)
 
 
 @pytest.mark.parametrize(("form", "downscale"), [("png", "2"), ("tiff", "1.3")])
