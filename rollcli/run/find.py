@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import PurePosixPath
-from typing import Any
+from typing import overload
 
 from rollcli.errors import InputError, UsageError
 from rollcli.extras import require_extra
@@ -303,7 +303,7 @@ def _sorted_frames(options: FramesOptions) -> "SortedFrames":
     return SortedFrames(manifest, _frame_maker(options), places)
 
 
-class SortedFrames(Sequence[Any]):
+class SortedFrames(Sequence[Frame]):
     """The frames of a manifest, made when they are asked for; a slice of them is another such sequence."""
 
     def __init__(self, manifest: Manifest, make: Callable[..., Frame], places: range) -> None:
@@ -316,7 +316,13 @@ class SortedFrames(Sequence[Any]):
         for name in self._manifest.names(self._places):
             yield self._make(named_input(name))
 
-    def __getitem__(self, index: int | slice) -> Any:
+    @overload
+    def __getitem__(self, index: int) -> Frame: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> "SortedFrames": ...
+
+    def __getitem__(self, index: int | slice) -> "Frame | SortedFrames":
         if isinstance(index, int):
             return next(iter(self[index : index + 1 or None]))
         return SortedFrames(self._manifest, self._make, self._places[index])
