@@ -60,9 +60,15 @@ def _of_q(file: File, values: Value) -> Fields:
 
 
 def _matrices(file: File) -> dict[str, Value]:
-    read = {"<": _xml_values, "{": File.json}.get(file.text.lstrip()[:1], parse_yaml)
-    named = {key: value for key, value in read(file).items() if key in ("P1", "P2", "Q")}
-    return {key: each["data"] for key, each in named.items() if isinstance(each, dict) and "data" in each}
+    start = file.text.lstrip()[:1]
+    if start == "<":
+        values = _xml_values(file)
+    elif start == "{":
+        values = file.json()
+    else:
+        values = parse_yaml(file)
+    named = ((key, values.get(key)) for key in ("P1", "P2", "Q"))
+    return {key: value["data"] for key, value in named if isinstance(value, dict) and "data" in value}
 
 
 def _xml_values(file: File) -> dict[str, Value]:
