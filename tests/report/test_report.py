@@ -79,7 +79,7 @@ def test_a_page_holds_everything_it_shows(folder):
     assert "<script src" not in text
 
 
-def test_the_summary_says_options_version_counts_and_when_the_result_was_written(folder):
+def test_the_summary_says_options_version_counts_the_sign_and_when_the_result_was_written(folder):
     report(folder, "out/rolls.csv")
     text = html.unescape(
         re.sub(r"\s+", " ", re.sub(r"<(script|style).*?</\1>|<[^>]+>", " ", page_of(folder), flags=re.S))
@@ -89,6 +89,7 @@ def test_the_summary_says_options_version_counts_and_when_the_result_was_written
     for said in (
         *(f"rollcli {run['rollcli']}", "--max-roll 45", "inputs from maps"),
         *("frames 4 ok 3 suspect 0 failed 1", "Shown: 3 of 3 frames with an angle."),
+        *("nine in ten frames", "its right end is up"),
         f"result written {written:%Y-%m-%d %H:%M} UTC",
     ):
         assert said in text
