@@ -638,7 +638,7 @@ class RigOptions:
     results : tuple of str
         One result or several, or the shards of one run.
     against : str or None
-        A later result: say how far the rig has moved until then.
+        A later result: say how far the rig has moved until then; checks are of both.
     include_suspect : bool
         Let suspect frames count too.
     groups : str
