@@ -237,7 +237,6 @@ def match_pair(
     options: StereoOptions,
     find_road: FindRoad | None = None,
     rig: Calibration | None = None,
-    look: FirstLook | None = None,
 ) -> StereoMatch:
     """Match a rectified pair, and keep all that was found on the way.
 
@@ -251,8 +250,6 @@ def match_pair(
     rig : Calibration, optional
         Of the views as they are given: a yaw or a pitch of the right camera turns its columns about the
         principal point.
-    look : FirstLook, optional
-        At the pair, where there was one.
 
     Raises
     ------
@@ -267,30 +264,30 @@ def match_pair(
     if width > _WIDEST:
         raise InputError(f"images {width} px wide cannot be matched, {_WIDEST} can: give --downscale 2")
     told = options.given_alignment(width, height)
-    small, again = SmallViews(views, given), look is not None
-    look = look or _look_at(small, options, told)
-    count = options.num_disparities
-    if count is None:
-        count = (width // 8 if look.range is None else look.range) - first
-    count = usable_range(count, first, width, options.block_size)
+    small = SmallViews(views, given)
+    look = _look_at(small, options, told)
+    looked_for = (width // 8 if look.range is None else look.range) - first
+    count = usable_range(options.num_disparities or looked_for, first, width, options.block_size)
+    most = count if options.num_disparities else usable_range(2 * count, first, width, options.block_size)
 
     blank, find_road = shows_nothing(views[0]), find_road if first >= 0 else None
     tried: list[Levelled] = []
 
     def match(lies: Misalignment) -> Map:
-        before = tried[-1] if tried else None
-        tried.append(Levelled(views, lies, look.disparity, first, count, options, find_road, blank, before))
-        return tried[-1].matched()
+        before, searched = (tried[-1], tried[-1].count) if tried else (None, count)
+        pair = Levelled(views, lies, look.disparity, first, searched, options, find_road, blank, before)
+        disparity = pair.matched()
+        if pair.count < most and _share_at_end(disparity, pair) > MUCH_AT_END:
+            pair = replace(pair, count=most, before=None)
+            disparity = pair.matched()
+        tried.append(pair)
+        return disparity
 
     if options.measures_alignment:
         found = _match_levelled(match, small, look, first < 0)
     else:
         found = _match_as_told(match, small, told, check=options.checks_alignment)
     pair, corrected = tried[-1], found.corrected
-    end_fraction = _share_at_end(found.disparity, pair)
-    grows = usable_range(2 * count, first, width, options.block_size) > count
-    if grows and end_fraction > MUCH_AT_END and options.num_disparities is None and not again:
-        return match_pair(left, right, options, find_road, rig, replace(look, range=first + 2 * count))
     support = found.support(_axis(rig, given[0].shape, options.downscale), height)
     lies = found.left_to_refine(small.shape)
 
@@ -301,8 +298,8 @@ def match_pair(
     return StereoMatch(
         disparity=disparity,
         min_disparity=first,
-        num_disparities=count,
-        end_fraction=end_fraction,
+        num_disparities=pair.count,
+        end_fraction=_share_at_end(found.disparity, pair),
         corrected=corrected,
         larger=support.scale,
         measured=found.measured,
