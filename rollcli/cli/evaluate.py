@@ -21,7 +21,8 @@ def accuracy(options: AccuracyOptions) -> int:
     """Compare the angles of RESULT, which estimate wrote, with known ones; its heights over the road, too.
 
     Frames are matched by the names of their files, without folder and ending. Those without a partner are
-    counted on stderr; exit status 3 when a frame of the truth has no angle.
+    counted on stderr; exit status 3 when a frame of the truth has no angle. An uneven lane has no one roll:
+    with the columns lane_lo_deg and lane_hi_deg, an interval that reaches this range is right.
 
     Examples
     --------

@@ -48,7 +48,8 @@ class Accuracy:
     share_above_0_5_deg : float or None
         Of the frames compared, from 0 to 1.
     coverage_95 : float or None
-        Share of the known values inside their 95 % interval, among the frames that have one.
+        Share of the known values inside their 95 % interval, among the frames that have one. An uneven lane
+        has no one roll: a part of it has to be inside.
     intervals : int
         How many have one.
     """
@@ -121,7 +122,10 @@ def assess(rows: Sequence[Row], truth: Mapping[str, KnownPose], result_name: str
         example = f": it holds {rows[0].file}, the truth {next(iter(truth))}" if rows else ": it is empty"
         raise UsageError(f"{result_name}: no row has the stem of a frame of the truth{example}")
     known = [(rows[place], truth[stem]) for stem, place in places.items() if stem in truth]
-    rolls = [(row, row.roll_deg, math.degrees(pose.theta), row.roll_ci95_deg) for row, pose in known]
+    rolls = [
+        (row, row.roll_deg, (math.degrees(pose.theta), *pose.lane_deg), row.roll_ci95_deg)
+        for row, pose in known
+    ]
     statuses = [row.status for row, _ in known if row.roll_deg is not None]
     return Comparison(
         roll=_accuracy(rolls, period=180) or Accuracy(),
@@ -129,26 +133,36 @@ def assess(rows: Sequence[Row], truth: Mapping[str, KnownPose], result_name: str
         suspect=statuses.count("suspect"),
         no_angle=tuple(s for s in truth if s not in places or rows[places[s]].roll_deg is None),
         no_truth=tuple(rows[place].file for stem, place in places.items() if stem not in truth),
-        pitch=_accuracy([(row, row.pitch_deg, pose.pitch_deg, row.pitch_ci95_deg) for row, pose in known]),
-        height=_accuracy([(row, row.height_m, pose.height_m, row.height_ci95_m) for row, pose in known]),
+        pitch=_accuracy([(row, row.pitch_deg, (pose.pitch_deg,), row.pitch_ci95_deg) for row, pose in known]),
+        height=_accuracy([(row, row.height_m, (pose.height_m,), row.height_ci95_m) for row, pose in known]),
     )
 
 
-_Compared = tuple[Row, float | None, float | None, float | None]
+_Compared = tuple[Row, float | None, Sequence[float | None], float | None]
 
 
 def _accuracy(compared: Sequence[_Compared], period: float = math.inf) -> Accuracy | None:
-    """Sum up rows, each with its value, the known one and the half-width of its interval; None of nothing."""
-    found = [
-        (row.file, math.remainder(value - known, period), half_width)  # angles half a turn apart are the same
-        for row, value, known, half_width in compared
-        if value is not None and known is not None
-    ]
+    """Sum up rows, each with its value, what is known of it, and the half-width of its interval.
+
+    Known is a value, and after it the ends of a range, of which a part has to be in the interval. None where
+    nothing is known.
+    """
+    found = []
+    for row, value, known, half_width in compared:
+        off = [  # angles half a turn apart are the same
+            math.remainder(value - each, period) for each in known if value is not None and each is not None
+        ]
+        if off:
+            found.append((row.file, off, half_width))
     if not found:
         return None
-    errors = np.array([error for _, error, _ in found])
+    errors = np.array([off[0] for _, off, _ in found])
     worst = int(np.abs(errors).argmax())
-    inside = [abs(error) <= half_width for _, error, half_width in found if half_width is not None]
+    inside = [
+        min(off) <= half_width and max(off) >= -half_width
+        for _, off, half_width in found
+        if half_width is not None
+    ]
     coverage = float(np.mean(inside)) if inside else None
     figures = _figures(errors, len(found))
     return replace(figures, worst_file=found[worst][0], coverage_95=coverage, intervals=len(inside))

@@ -14,7 +14,8 @@ from rollcli.files.results import TEXT
 from rollcli.files.storage import read_named
 
 _NEEDED = ("file", "roll_deg")
-_READ = (*_NEEDED, "pitch_deg", "height_m", "curvature_per_m", "focal_px", "baseline_m")
+_LANE = "lane_lo_deg", "lane_hi_deg"
+_READ = (*_NEEDED, *_LANE, "pitch_deg", "height_m", "curvature_per_m", "focal_px", "baseline_m")
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,8 @@ class KnownPose:
 
     `focal_baseline` is its focal length times its baseline, px m: what depth times disparity is.
 
-    `bends` says that the road does, so that pitch and height over the road ahead are others.
+    `bends` says that the road does, so that pitch and height over the road ahead are others. `lane_deg` has
+    the least and the greatest roll of parts of an uneven lane, where they are known.
     """
 
     theta: float
@@ -31,6 +33,7 @@ class KnownPose:
     height_m: float | None = None
     bends: bool = False
     focal_baseline: float | None = None
+    lane_deg: tuple[float, ...] = ()
 
 
 def by_stem(names: Sequence[str], where: str) -> dict[str, int]:
@@ -106,7 +109,8 @@ def _known(line: Mapping[str, str], where: str) -> KnownPose:
     )
     rig = [_number(line, name, where) for name in ("focal_px", "baseline_m") if line.get(name)]
     scale = rig[0] * rig[1] if len(rig) == 2 else None
-    return KnownPose(math.radians(_number(line, "roll_deg", where)), pitch, height, bends, scale)
+    lane = tuple(_number(line, name, where) for name in _LANE if line.get(name))
+    return KnownPose(math.radians(_number(line, "roll_deg", where)), pitch, height, bends, scale, lane)
 
 
 def _number(line: Mapping[str, str], name: str, where: str) -> float:

@@ -51,6 +51,9 @@ def test_an_error_of_just_the_limit_is_not_above_it_and_just_of_the_interval_is_
     assert (found.roll.worst, found.roll.worst_file) == (0.5, "maps/frame1.png")
     given = dataclasses.replace(rows(0.0)[0], pitch_deg=0.5, pitch_ci95_deg=0.5)
     assert assess([given], {"frame1": KnownPose(0.0, 0.0)}, "").pitch.coverage_95 == 1
+    lane = {"frame1": KnownPose(0.0, lane_deg=(-0.25, 0.125))}
+    reached = [assess(rows(angle, ci95=0.5), lane, "").roll for angle in (0.625, 0.63, -0.75, -0.76)]
+    assert [each.coverage_95 for each in reached] == [1, 0, 1, 0]
     unsure = dataclasses.replace(given, pitch_ci95_deg=None)
     assert assess([unsure], {"frame1": KnownPose(0.0, 0.0)}, "").pitch.coverage_95 is None
 
