@@ -14,20 +14,17 @@ from rollcli import __version__
 from rollcli.errors import ExitStatus, InputError, RollcliError, UsageError, output_error
 from rollcli.messages import one_line, say
 
-# name -> (module, one-line help): `rollcli --help` needs no command's module
+# name -> (module of this package, one-line help): `rollcli --help` needs no command's module
 COMMANDS = {
-    "estimate": (
-        "rollcli.cli.estimate",
-        "The roll of each disparity map or stereo pair, as CSV, JSON Lines or Parquet.",
-    ),
-    "disparity": ("rollcli.cli.images", "Stereo pairs to disparity maps with OpenCV SGBM."),
-    "derotate": ("rollcli.cli.images", "Rotate maps by one angle, or by the angles of a result."),
-    "vdisparity": ("rollcli.cli.images", "v-disparity images of maps."),
-    "heights": ("rollcli.cli.images", "Heights over the road, of maps and their result."),
-    "simulate": ("rollcli.cli.simulate", "Render road stereo pairs and true disparity with known roll."),
-    "evaluate": ("rollcli.cli.evaluate", "The paper's experiments; accuracy against known angles."),
-    "rig": ("rollcli.cli.rig", "What a result says about the rig: mounting, drift, jumps; a gate for CI."),
-    "report": ("rollcli.cli.report", "An HTML report of a result."),
+    "estimate": ("estimate", "The roll of each disparity map or stereo pair, as CSV, JSON Lines or Parquet."),
+    "disparity": ("images", "Stereo pairs to disparity maps with OpenCV SGBM."),
+    "derotate": ("images", "Rotate maps by one angle, or by the angles of a result."),
+    "vdisparity": ("images", "v-disparity images of maps."),
+    "heights": ("images", "Heights over the road, of maps and their result."),
+    "simulate": ("simulate", "Render road stereo pairs and true disparity with known roll."),
+    "evaluate": ("evaluate", "The paper's experiments; accuracy against known angles."),
+    "rig": ("rig", "What a result says about the rig: mounting, drift, jumps; a gate for CI."),
+    "report": ("report", "An HTML report of a result."),
 }
 
 
@@ -42,7 +39,7 @@ class LazyGroup(click.Group):
         """Import a command."""
         if cmd_name not in COMMANDS:
             return None
-        command: click.Command = getattr(import_module(COMMANDS[cmd_name][0]), cmd_name)
+        command: click.Command = getattr(import_module(f"rollcli.cli.{COMMANDS[cmd_name][0]}"), cmd_name)
         return command
 
     def resolve_command(

@@ -14,13 +14,7 @@ from typing import Any, NamedTuple
 from rollcli.errors import UsageError
 from rollcli.files.atomic import remove_leftovers, sync_files
 from rollcli.files.containers import file_of
-from rollcli.files.results import (
-    column_types,
-    encode_parquet,
-    format_header,
-    format_row,
-    run_path,
-)
+from rollcli.files.results import column_types, encode_parquet, format_header, format_row, run_path
 from rollcli.files.storage import create, write_bytes
 from rollcli.files.stores.locations import is_url, public_name, tasks_in_hand
 from rollcli.files.stores.objects import object_owner
