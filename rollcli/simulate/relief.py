@@ -84,15 +84,13 @@ class Relief:
         dips = [0.0, *(dip.height for dip in self.dips)]
         return float(self.heights.min()) + min(dips), float(self.heights.max()) + max(dips)
 
-    def is_between(self, first: tuple[Array, Array], last: tuple[Array, Array]) -> NDArray[np.bool_]:
-        """Tell where it may be uneven between two positions (lateral and Z, each (N,)), metres."""
-        found = np.full(first[0].shape, bool(self.heights.any()))
+    def is_between(self, low: Array, high: Array) -> NDArray[np.bool_]:
+        """Tell where it may be uneven from the least lateral and Z to the greatest, each (2, N), metres."""
+        found = np.full(low.shape[1:], bool(self.heights.any()))
         for dip in self.dips:
-            near = np.ones(found.shape, bool)
-            places = ((dip.lateral, _AROUND * dip.across), (dip.z, _AROUND * dip.along))
-            for one, other, (middle, radius) in zip(first, last, places, strict=True):
-                near &= (np.fmax(one, other) > middle - radius) & (np.fmin(one, other) < middle + radius)
-            found |= near
+            middle = np.array([[dip.lateral], [dip.z]])
+            radius = _AROUND * np.array([[dip.across], [dip.along]])
+            found |= ((high > middle - radius) & (low < middle + radius)).all(axis=0)
         return found
 
     def height(self, lateral: Vectors, z: Vectors) -> Vectors:

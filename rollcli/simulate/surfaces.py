@@ -128,11 +128,12 @@ class Ground(Surface):
         )
         first = highest._entered(origin, direction)
         last = np.fmax(first, lowest._first_smooth_hit(origin, direction))
-        ends = [origin + t * direction for t in (first, last)]
-        sides, ahead = [self.course.lateral(end) for end in ends], [end[2] for end in ends]
-        inside = (np.fmax(*sides) >= self.edges[0]) & (np.fmin(*sides) < self.edges[-1])
-        uneven = self.relief.is_between((sides[0], ahead[0]), (sides[1], ahead[1]))
-        reached = np.flatnonzero(inside & uneven & (ahead[0] < self.far))  # nan is not
+        ends = (origin + t * direction for t in (first, last))
+        begin, end = (np.array([self.course.lateral(each), each[2]]) for each in ends)
+        low, high = np.fmin(begin, end), np.fmax(begin, end)
+        inside = (high[0] >= self.edges[0]) & (low[0] < self.edges[-1]) & (begin[1] < self.far)
+        uneven = self.relief.is_between(low, high)
+        reached = np.flatnonzero(inside & uneven)  # nan is not
         start = np.broadcast_to(origin, direction.shape)[:, reached]
         onward, near, far = direction[:, reached], first[reached], last[reached]
         hits = np.where(uneven, np.nan, self._first_smooth_hit(origin, direction))

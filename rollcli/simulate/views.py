@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -314,7 +315,6 @@ def _edges(hits: Hits, width: int) -> NDArray[np.bool_]:
     """Find pixels that differ from a neighbour in surface, material or shadow."""
     shadow = hits.reads[SUN] == 0
     kind = (hits.surface.astype(np.int32) << 17) + (hits.material.astype(np.int32) << 1) + shadow
-    kind = kind.reshape(-1, width)
-    padded = np.pad(kind, 1, mode="edge")
-    beside = (padded[1:-1, 2:] != kind) | (padded[1:-1, :-2] != kind)
-    return np.asarray(beside | (padded[2:, 1:-1] != kind) | (padded[:-2, 1:-1] != kind)).ravel()
+    cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+    change = cv2.morphologyEx(kind.reshape(-1, width).astype(np.float64), cv2.MORPH_GRADIENT, cross)
+    return np.asarray(change.ravel() != 0)
