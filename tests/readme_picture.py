@@ -10,7 +10,7 @@ import numpy as np
 import rollcli
 from rollcli.files.atomic import write_atomic
 from rollcli.pictures.overlay import draw_disparity
-from rollcli.pictures.vdisparity import draw_v_disparity, row_offset
+from rollcli.pictures.vdisparity import MiddleColumn, draw_v_disparity
 from tests.run_cli import ROOT
 
 MAP, PICTURE = ROOT / "sample_data" / "maps" / "frame_0001.png", ROOT / ".github" / "readme.png"
@@ -24,7 +24,7 @@ def picture() -> np.ndarray:
     level = rollcli.derotate(disparity, roll.theta)
     before = rollcli.v_disparity(disparity, bins=_BINS)
     after = rollcli.v_disparity(level, bins=_BINS, max_disparity=before.max_disparity)
-    curve = roll.alpha, row_offset(roll.theta, roll.width, roll.height)
+    column = MiddleColumn.of_level(roll.theta, roll.width, roll.height)
     parts = [
         draw_disparity(disparity),
         _gap(_GAP, roll.height),
@@ -32,7 +32,7 @@ def picture() -> np.ndarray:
         _gap(_WIDE_GAP, roll.height),
         draw_disparity(level),
         _gap(_GAP, roll.height),
-        draw_v_disparity(after, *curve),
+        draw_v_disparity(after, column.profile(roll.alpha)),
     ]
     height = max(len(part) for part in parts)
     return np.hstack([_padded(part if part.shape[2] == 4 else _opaque(part), height) for part in parts])

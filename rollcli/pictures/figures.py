@@ -22,7 +22,7 @@ from rollcli.estimator.road.model import Parabola
 from rollcli.pictures.colours import LIGHT
 from rollcli.pictures.derotate import derotate
 from rollcli.pictures.overlay import brightest
-from rollcli.pictures.vdisparity import VDisparity, profile, row_offset, shown_counts, v_disparity
+from rollcli.pictures.vdisparity import MiddleColumn, VDisparity, shown_counts, v_disparity
 
 _SETTINGS = threading.Lock()  # matplotlib has one set of them for all threads
 COLUMN = 3.5 * 72  # pt: the width of a column in journals of two columns
@@ -126,11 +126,8 @@ def v_disparity_figure(
     height, width = disparity.shape
     maps = (disparity, derotate(disparity, theta))
     titles = ("as it is", "de-rotated by " + f"{math.degrees(theta):.2f}°".replace("-", "−"))
-    curves: list[Parabola | None] = [None, None]
-    if alpha is not None:
-        start = row_offset(theta, width, height)
-        a0, a1, a2 = alpha
-        curves = [profile(alpha, theta, width), (a0 + a1 * start + a2 * start**2, a1 + 2 * a2 * start, a2)]
+    columns = MiddleColumn.of_map(theta, width), MiddleColumn.of_level(theta, width, height)
+    curves = [None if alpha is None else column.profile(alpha) for column in columns]
     counted = [v_disparity(each, bins=bins, max_disparity=max_disparity) for each in maps]
     with drawing_style(PRINT):
         tall = 2 * _MAP_WIDTH * height / width + _AROUND

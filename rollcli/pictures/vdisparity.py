@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -92,41 +92,34 @@ def _counts(pixels: NDArray[np.float64], bins: int, max_disparity: float) -> NDA
     return np.ascontiguousarray(counts[:, :-1], dtype=np.int32)
 
 
-def row_offset(theta: float, width: int, height: int) -> float:
-    """Return what to add to a row of the map de-rotated about its centre to get y of the method, pixels.
+class MiddleColumn(NamedTuple):
+    """The middle column of a map, along which y of the method is start + step * row, pixels.
 
-    y = v cos - u sin is measured from the top-left pixel of the map as it was; `derotate` keeps the centre.
+    y = v cos - u sin is measured from the top-left pixel of the map as it was.
     """
-    u, v = (width - 1) / 2, (height - 1) / 2
-    return v * math.cos(theta) - u * math.sin(theta) - v
 
+    start: float
+    step: float
 
-def profile(alpha: Parabola, theta: float, width: int) -> Parabola:
-    """Return the road's disparity along the middle column of a map, as a parabola of the row.
+    @classmethod
+    def of_map(cls, theta: float, width: int) -> "MiddleColumn":
+        """Return that of a map as it is, rolled by `theta`, radians, and so many pixels wide."""
+        return cls(-(width - 1) / 2 * math.sin(theta), math.cos(theta))
 
-    Parameters
-    ----------
-    alpha : tuple of float
-        The road: d = a0 + a1 y + a2 y^2, pixels, y measured as the method does.
-    theta : float
-        Roll of the map, radians.
-    width : int
-        Of the map, pixels.
-    """
-    a0, a1, a2 = alpha
-    start, step = _middle_column(theta, width)
-    return a0 + a1 * start + a2 * start**2, (a1 + 2 * a2 * start) * step, a2 * step**2
+    @classmethod
+    def of_level(cls, theta: float, width: int, height: int) -> "MiddleColumn":
+        """Return that of the same map once it is de-rotated about its centre, as `derotate` does."""
+        u, v = (width - 1) / 2, (height - 1) / 2
+        return cls(v * math.cos(theta) - u * math.sin(theta) - v, 1.0)
 
+    def profile(self, alpha: Parabola) -> Parabola:
+        """Return the road's disparity along it, as a parabola of the row, from that of y; pixels."""
+        (a0, a1, a2), (start, step) = alpha, self
+        return a0 + a1 * start + a2 * start**2, (a1 + 2 * a2 * start) * step, a2 * step**2
 
-def middle_row(y: float, theta: float, width: int) -> float:
-    """Return the row where the middle column of a map has a y of the method, pixels."""
-    start, step = _middle_column(theta, width)
-    return (y - start) / step
-
-
-def _middle_column(theta: float, width: int) -> tuple[float, float]:
-    """Return start and step of y = start + step * row along the middle column of a map."""
-    return -(width - 1) / 2 * math.sin(theta), math.cos(theta)
+    def row(self, y: float) -> float:
+        """Return the row where y is this, pixels."""
+        return (y - self.start) / self.step
 
 
 _UNIT_ROWS = 480  # sizes below are pixels; a map of so many times these rows has them so many times larger
@@ -142,7 +135,7 @@ _HORIZON = (120, 220, 120)
 
 
 def draw_v_disparity(
-    histogram: VDisparity, alpha: Parabola | None = None, offset: float = 0.0, horizon: float | None = None
+    histogram: VDisparity, curve: Parabola | None = None, horizon: float | None = None
 ) -> Pixels:
     """Draw counts: log scale, bright where many, with the road's parabola and the horizon over them.
 
@@ -150,10 +143,8 @@ def draw_v_disparity(
     ----------
     histogram : VDisparity
         Of a de-rotated map, where the road is a thin line.
-    alpha : tuple of float, optional
-        The road: d = a0 + a1 y + a2 y^2, pixels, with y = row + offset.
-    offset : float
-        See `row_offset`.
+    curve : tuple of float, optional
+        The road: d = a0 + a1 row + a2 row^2, pixels; see `MiddleColumn.profile`.
     horizon : float, optional
         The row of the road's horizon, pixels.
 
@@ -171,8 +162,8 @@ def draw_v_disparity(
     chart = cv2.applyColorMap(grey, cv2.COLORMAP_INFERNO).astype(np.uint8, copy=False)
     if horizon is not None and 0 <= horizon <= len(chart) - 1:
         _draw_horizon(chart, round(horizon), unit)
-    if alpha is not None:
-        _draw_road(chart, np.polynomial.Polynomial(alpha), offset, top, unit)
+    if curve is not None:
+        _draw_road(chart, curve, top, unit)
     return _with_margins(chart, top, unit)
 
 
@@ -189,12 +180,12 @@ def shown_counts(histogram: VDisparity, width: int) -> tuple[NDArray[np.float32]
     return shown.astype(np.float32, copy=False), bins * per_bin
 
 
-def _draw_road(chart: Pixels, road: "np.polynomial.Polynomial", offset: float, top: float, unit: int) -> None:
+def _draw_road(chart: Pixels, curve: Parabola, top: float, unit: int) -> None:
     """Draw the road's curve, dashed so that what it lies on can be seen."""
     height, width = chart.shape[:2]
     for start in range(0, height, 2 * _DASH * unit):
         rows = np.arange(start, min(start + _DASH * unit, height))
-        columns = road(rows + offset) * (width / top)
+        columns = np.polynomial.Polynomial(curve)(rows) * (width / top)
         points = np.column_stack([columns, rows])[(columns >= 0) & (columns < width)]
         sides = [points + np.array([side, 0.0]) for side in (-0.5 * unit, 0.5 * unit)]
         fixed = [np.rint(each * 2**_SHIFT).astype(np.int32) for each in sides]

@@ -4,6 +4,7 @@ import base64
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, TypeVar
 
 import cv2
@@ -12,11 +13,12 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError
 from rollcli.estimator.estimate import estimate_roll
+from rollcli.estimator.road.model import Parabola
 from rollcli.files.formats import read_image, read_stored
 from rollcli.pictures.derotate import derotate
 from rollcli.pictures.heights import CAMERA_HEIGHTS, METRES, FittedRoad, heights_over, steadied, unit_of
 from rollcli.pictures.overlay import draw_disparity, draw_heights, draw_road
-from rollcli.pictures.vdisparity import draw_v_disparity, row_offset, v_disparity
+from rollcli.pictures.vdisparity import MiddleColumn, draw_v_disparity, v_disparity
 from rollcli.report.sources import Subject
 from rollcli.run.options import EncodingOptions, FramesOptions
 from rollcli.run.read import FRAME_ERRORS, Source, read_source
@@ -24,6 +26,9 @@ from rollcli.run.read import FRAME_ERRORS, Source, read_source
 # small enough that a page with a dozen frames opens at once, large enough to see a stripe of noise
 _WIDEST, _MOST_BINS, _QUALITY = 1280, 320, 82
 _SAME = math.radians(1e-4)  # a result holds angles to a millionth of a degree
+
+# which picture an image is that `estimate` drew
+_WRITTEN = {"road": "road_mask", "level_counts": "vdisparity", "heights": "heights_preview"}
 
 Made = TypeVar("Made")
 
@@ -71,6 +76,9 @@ def take_pictures(subject: Subject) -> Pictures:
         "level_counts": lambda: _level_counts(subject, disparity, level),
         "heights": lambda: _heights(subject, source),
     }
+    for name, kind in _WRITTEN.items():
+        if kind in subject.images:
+            makers[name] = partial(read_image, subject.images[kind])
     drawn = {name: _attempt(make)[0] for name, make in makers.items()}
     return Pictures({name: _encoded(each) for name, each in drawn.items() if each is not None}, missing)
 
@@ -113,9 +121,7 @@ def _read(subject: Subject, options: FramesOptions, kind: str = "") -> Source:
 
 
 def _road(subject: Subject, source: Source | None) -> NDArray[Any] | None:
-    """Draw the road on the left image of a pair: as `estimate` wrote it, else found again."""
-    if "road_mask" in subject.images:
-        return read_image(subject.images["road_mask"])
+    """Draw the road on the left image of a pair, found again."""
     if source is None or source.photo is None:
         return None
     request = subject.options.method.request(calibration=source.calibrated(subject.frame.calibration))
@@ -137,22 +143,19 @@ def _level(subject: Subject, disparity: NDArray[Any] | None) -> NDArray[Any] | N
 def _level_counts(
     subject: Subject, disparity: NDArray[Any] | None, level: NDArray[Any] | None
 ) -> NDArray[Any] | None:
-    if "vdisparity" in subject.images:
-        return read_image(subject.images["vdisparity"])
     if level is None:
         return None
     height, width = level.shape
-    scale = level if disparity is None else disparity
-    return _counts(level, scale, subject.row.alpha, row_offset(subject.theta, width, height))
+    column, alpha = MiddleColumn.of_level(subject.theta, width, height), subject.row.alpha
+    curve = None if alpha is None else column.profile(alpha)
+    return _counts(level, level if disparity is None else disparity, curve)
 
 
 def _heights(subject: Subject, source: Source | None) -> NDArray[Any] | None:
-    """Draw the heights over the road: as `estimate` drew or wrote them, else those of the map.
+    """Draw the heights over the road: as `estimate` wrote them, else those of the map.
 
     Of a map they are in metres where there is a calibration or the row has the camera's height.
     """
-    if "heights_preview" in subject.images:
-        return read_image(subject.images["heights_preview"])
     span, camera = subject.options.images.heights_range, subject.row.height_m
     photo = None if source is None else source.photo
     unit = CAMERA_HEIGHTS if camera is None else METRES
@@ -174,14 +177,13 @@ def _heights(subject: Subject, source: Source | None) -> NDArray[Any] | None:
 def _counts(
     disparity: NDArray[Any],
     scale: NDArray[Any],
-    alpha: tuple[float, float, float] | None = None,
-    offset: float = 0.0,
+    curve: Parabola | None = None,
 ) -> NDArray[Any]:
     """Draw the v-disparity from 0 to the largest disparity of `scale`, so that two can be compared."""
     histogram = v_disparity(scale)
     bins = min(histogram.counts.shape[1], _MOST_BINS)
     counted = v_disparity(disparity, bins=bins, max_disparity=histogram.max_disparity)
-    return draw_v_disparity(counted, alpha, offset)
+    return draw_v_disparity(counted, curve)
 
 
 def _encoded(picture: NDArray[Any]) -> Picture:

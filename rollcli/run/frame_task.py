@@ -20,7 +20,7 @@ from rollcli.files.storage import noting
 from rollcli.pictures.derotate import derotate, rotation_matrix
 from rollcli.pictures.heights import FittedRoad, heights_over, steadied, unit_of
 from rollcli.pictures.overlay import draw_heights, draw_preview, draw_road
-from rollcli.pictures.vdisparity import draw_v_disparity, middle_row, profile, row_offset, v_disparity
+from rollcli.pictures.vdisparity import MiddleColumn, draw_v_disparity, v_disparity
 from rollcli.rig.calibration import Calibration
 from rollcli.rig.pose import horizon_row, with_pose
 from rollcli.run.diagnosis import estimate_or_liken, looks_like, sure_estimate
@@ -128,10 +128,10 @@ class Pictured:
         """Draw the v-disparity image of the map turned upright."""
         estimate = self.estimate
         histogram = v_disparity(derotate(self.source.shown, estimate.theta))
-        offset = row_offset(estimate.theta, estimate.width, estimate.height)
+        column = MiddleColumn.of_level(estimate.theta, estimate.width, estimate.height)
         horizon = None if self.calibration is None else horizon_row(estimate.tangent, self.calibration)
-        row = None if horizon is None else horizon - offset
-        return path, encode_png(draw_v_disparity(histogram, estimate.alpha, offset, row))
+        row = None if horizon is None else column.row(horizon)
+        return path, encode_png(draw_v_disparity(histogram, column.profile(estimate.alpha), row))
 
     def disparity(self, path: str) -> _Named:
         """Take the map that was matched."""
@@ -252,11 +252,12 @@ def _counted(source: Source, of: Frame, options: VDisparityOptions, paths: Mappi
     if estimate is None:
         likeness = looks_like(source.disparity, source.stored, options)
     else:
-        curve = profile(estimate.alpha, estimate.theta, estimate.width)
+        column = MiddleColumn.of_map(estimate.theta, estimate.width)
+        curve = column.profile(estimate.alpha)
         if (calibration := source.calibrated(of.calibration)) is not None:
             y = horizon_row(estimate.tangent, calibration)
-            horizon = None if y is None else middle_row(y, estimate.theta, estimate.width)
-    files = {paths["vdisparity"]: encode_png(draw_v_disparity(histogram, curve, horizon=horizon))}
+            horizon = None if y is None else column.row(y)
+    files = {paths["vdisparity"]: encode_png(draw_v_disparity(histogram, curve, horizon))}
     if options.counts:
         files[paths["counts"]] = encode_stored(histogram.counts, "tiff")
     return files, {**source.warnings, likeness: likeness}

@@ -109,7 +109,7 @@ def main() -> None:
         "derotate, float32": lambda: derotate(real, 0.05),
         "derotate, uint16": lambda: derotate(kitti, 0.05),
         "v_disparity": lambda: v_disparity(real),
-        "draw_v_disparity": lambda: draw_v_disparity(level, (5.0, 0.2, 0.0), -30.0),
+        "draw_v_disparity": lambda: draw_v_disparity(level, (-1.0, 0.2, 0.0)),
         "draw_road": lambda: draw_road(frame.disparity, frame.road),
         "match_pair, range given": lambda: match_pair(*views, StereoOptions(num_disparities=128)),
         "match_pair, range found": lambda: match_pair(*views, StereoOptions()),

@@ -20,11 +20,9 @@ from rollcli.pictures.derotate import derotate, rotation_matrix
 from rollcli.pictures.heights import FittedRoad, heights_over, steadied, unit_of
 from rollcli.pictures.overlay import draw_disparity, draw_heights, draw_preview, draw_road, round_step
 from rollcli.pictures.vdisparity import (
+    MiddleColumn,
     VDisparity,
     draw_v_disparity,
-    middle_row,
-    profile,
-    row_offset,
     shown_counts,
     v_disparity,
 )
@@ -243,9 +241,10 @@ CASES = {
     "counts in many bins": partial(_counted, 40 * _map((20, 30))),
     "counts of nothing": partial(_counted, np.zeros((5, 4))),
     "along the middle": lambda: [
-        [profile(CURVE, theta, width), middle_row(33.0, theta, width), row_offset(theta, width, 41)]
+        [column.profile(CURVE), column.row(33.0), MiddleColumn.of_level(theta, width, 41).start]
         for theta in (-0.4, 0.0, 0.3)
         for width in (1, 30, 31)
+        for column in [MiddleColumn.of_map(theta, width)]
     ],
     **{f"heights: {name}": partial(_heights, name) for name in ROADS},
     "heights: hill": partial(_heights, "flat", hill=1.5),
@@ -281,7 +280,7 @@ CASES = {
     ),
     **{
         f"v-disparity of {height} rows": partial(
-            _picture, draw_v_disparity, _histogram(height), CURVE, 5.0, horizon
+            _picture, draw_v_disparity, _histogram(height), MiddleColumn(5.0, 1.0).profile(CURVE), horizon
         )
         for height, horizon in ((120, 31.0), (479, 2.0), (960, 400.4))
     },

@@ -9,7 +9,7 @@ from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.request import Request
 from rollcli.pictures import vdisparity as vdisparity_module
 from rollcli.pictures.derotate import derotate
-from rollcli.pictures.vdisparity import row_offset, v_disparity
+from rollcli.pictures.vdisparity import MiddleColumn, v_disparity
 from tests.run_cli import road_map
 
 
@@ -132,6 +132,6 @@ def test_the_parabola_lies_on_the_road_of_the_derotated_map(roll_deg):
     estimate = estimate_roll(disparity, Request(road="all"))
 
     level = derotate(disparity, estimate.theta)
-    y = np.arange(200) + row_offset(estimate.theta, 300, 200)
+    y = np.arange(200) + MiddleColumn.of_level(estimate.theta, 300, 200).start
 
     np.testing.assert_allclose(level[:, 150], np.polyval(estimate.alpha[::-1], y), atol=0.01)
