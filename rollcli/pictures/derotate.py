@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
-from rollcli.estimator.moments import Floats, has_disparity, map_of, strips
-
-Flags = NDArray[np.bool_]
+from rollcli.estimator.moments import Bools, Floats, has_disparity, map_of, strips
 
 _BLOCK = 1 << 16  # pixels turned at a time: what they need stays in the processor's cache
 
@@ -146,8 +144,8 @@ def _centred(shape: tuple[int, ...]) -> tuple[Floats, Floats]:
     return rows, columns
 
 
-def _validity(values: NDArray[Any], invalid: Iterable[float]) -> Flags:
-    valid: Flags = has_disparity(values)
+def _validity(values: NDArray[Any], invalid: Iterable[float]) -> Bools:
+    valid: Bools = has_disparity(values)
     of_16_bits = values.dtype.kind in "iu" and values.dtype.itemsize == 2  # of either byte order
     saturated = [np.iinfo(values.dtype).max] if of_16_bits else []
     with np.errstate(over="ignore"):  # a value may lie beyond what the dtype holds
@@ -156,7 +154,7 @@ def _validity(values: NDArray[Any], invalid: Iterable[float]) -> Flags:
     return valid
 
 
-def _not_nearest_to_invalid(valid: Flags, size: tuple[int, int], roll: float) -> Flags:
+def _not_nearest_to_invalid(valid: Bools, size: tuple[int, int], roll: float) -> Bools:
     """Return the pixels of the result that no invalid pixel of the map falls on."""
     kept, (rows, columns), (v, u) = np.ones(size, bool), np.nonzero(~valid), _centred(valid.shape)
     x = math.cos(roll) * u[columns] + math.sin(roll) * v[rows] + (size[1] - 1) / 2
@@ -167,7 +165,7 @@ def _not_nearest_to_invalid(valid: Flags, size: tuple[int, int], roll: float) ->
     return kept
 
 
-def _interpolated(padded: NDArray[Any], sources: tuple[Floats, Floats]) -> tuple[NDArray[Any], Flags]:
+def _interpolated(padded: NDArray[Any], sources: tuple[Floats, Floats]) -> tuple[NDArray[Any], Bools]:
     """Values between the valid (positive) pixels of a map padded by 2, and where the nearest one is valid."""
     width = padded.shape[1]
     v, u = (np.clip(each, -1.5, side - 3.5) for each, side in zip(sources, padded.shape, strict=True))
@@ -190,7 +188,7 @@ def _interpolated(padded: NDArray[Any], sources: tuple[Floats, Floats]) -> tuple
     return np.divide(total, weight, out=total, where=known), known
 
 
-def _no_data(values: NDArray[Any], valid: Flags) -> float:
+def _no_data(values: NDArray[Any], valid: Bools) -> float:
     """Return how this map writes "no data"."""
     if values.dtype.kind == "u" or valid.all():
         return 0

@@ -27,14 +27,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError
 from rollcli.estimator.estimate import RollEstimate
-from rollcli.estimator.moments import Floats, Singles, from_infinity, has_disparity, map_of, strips
+from rollcli.estimator.moments import Bools, Floats, Singles, from_infinity, has_disparity, map_of, strips
 from rollcli.estimator.road.model import FARTHEST_SIDE, Coordinate, RoadModel
 from rollcli.estimator.road.sample import medians_of
 from rollcli.files.results import Row
 from rollcli.rig.calibration import Calibration, require_calibration
 from rollcli.rig.pose import turns_of
-
-Flags = NDArray[np.bool_]
 
 _BLOCK = 1 << 16  # pixels at a time: what they need stays in the processor's cache
 _FLATTEST = 0.2  # of the rise near ahead: a parabola that is flatter is no road, which then goes on straight
@@ -319,11 +317,8 @@ class _Profile:
             d = stored.astype(np.float32)
         known = has_disparity(d)
         d[~known] = self.disparity
-        rest: Singles | np.float32 = np.float32(1)
-        root: Singles | np.float32 = np.float32(1)
-        if camber:
-            across = road.across(columns, rows)
-            side, rest, root = _cambered(d, across, road)
+        across = road.across(columns, rows)
+        side, rest, root = _cambered(d, across, road)
         foot, rise = self.at(d * rest)
         rise *= root
         gap = foot + columns * np.float32(sine) - (rows * np.float32(cosine) - np.float32(self.row))
@@ -333,12 +328,11 @@ class _Profile:
         aspect = calibration.fy / calibration.fx
         along = calibration.cy * cosine - calibration.cx * sine - self.row
         ahead = d * rest / rise - foot + np.float32(along)
-        lean: Singles | np.float32 = np.float32(sine**2 + (aspect * cosine) ** 2)
-        if camber:
-            tilt = side / rise * np.float32(camber * road.middle_rise)
-            ahead += tilt * (np.float32(road.across(calibration.cx, calibration.cy)) - across)
-            skew = np.float32(2 * (aspect**2 - 1) * cosine * sine)
-            lean = (tilt * np.float32(cosine**2 + (aspect * sine) ** 2) + skew) * tilt + lean
+        tilt = side / rise * np.float32(camber * road.middle_rise)
+        ahead += tilt * (np.float32(road.across(calibration.cx, calibration.cy)) - across)
+        skew = np.float32(2 * (aspect**2 - 1) * cosine * sine)
+        lean = (tilt * np.float32(cosine**2 + (aspect * sine) ** 2) + skew) * tilt
+        lean += np.float32(sine**2 + (aspect * cosine) ** 2)
         ahead *= np.float32(1 / calibration.fx)
         length = np.sqrt(ahead * ahead + lean) * np.float32(1 / (calibration.baseline or 1.0))
         return np.where(known, gap / (length * d), np.float32(np.nan))
@@ -349,7 +343,7 @@ def _profile_basis(x: NDArray[Any]) -> NDArray[Any]:
     return np.stack([np.ones_like(x), x, 1 / x, x * x], axis=1)
 
 
-def _steady_fit(design: Floats, values: Floats, found: Flags) -> tuple[NDArray[Any], NDArray[Any]]:
+def _steady_fit(design: Floats, values: Floats, found: Bools) -> tuple[NDArray[Any], NDArray[Any]]:
     """Fit values by Tukey's weights, six spreads wide; return those, too.
 
     They begin with what the values are, and with what least absolute deviations leave of them, which a hill
@@ -365,7 +359,7 @@ def _steady_fit(design: Floats, values: Floats, found: Flags) -> tuple[NDArray[A
 
 
 def _tukey_fit(
-    design: Floats, values: Floats, found: Flags, off: NDArray[Any]
+    design: Floats, values: Floats, found: Bools, off: NDArray[Any]
 ) -> tuple[float, NDArray[Any], NDArray[Any]]:
     """Return the spread of a fit that begins with how far values are off, the fit, and its weights."""
     for _ in range(_ROUNDS):
