@@ -116,7 +116,7 @@ def _split(groups):
     for name, counts_of in FOLDERS.items():
         frames = sorted((place, folder) for folder, count in counts_of.items() for place in range(count))
         files = [f"{folder}/{place}.png".removeprefix("./") for place, folder in frames]
-        found[name] = made(split_drives, files, groups)
+        found[name] = made(split_drives, files, groups, [""] * len(files), np.full(len(files), np.nan))
     return found
 
 

@@ -3,6 +3,7 @@
 import math
 import os.path
 import re
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
@@ -56,7 +57,7 @@ def seconds_of(files: Sequence[str]) -> NDArray[np.float64]:
 
 
 def split_drives(
-    files: Sequence[str], groups: str = AUTO, kinds: Sequence[str] = (), rolls: Floats | None = None
+    files: Sequence[str], groups: str, kinds: Sequence[str], rolls: Floats
 ) -> list[tuple[str, NDArray[np.intp]]]:
     """Group frames into drives.
 
@@ -68,9 +69,9 @@ def split_drives(
         "auto": frames of one folder or recording are one drive, unless they hold hardly a frame each and
         their rolls do not differ beyond their spread; "none": all are one; else a pattern such as
         "data/run*": the folders that it matches are drives, with all below them.
-    kinds : sequence of str, optional
-        What else tells the frames of a folder apart, such as their size.
-    rolls : ndarray of float, shape (N,), optional
+    kinds : sequence of str
+        Of each frame what else tells those of a folder apart, such as their size; or empty.
+    rolls : ndarray of float, shape (N,)
         Degrees; NaN where a frame does not count.
 
     Returns
@@ -90,19 +91,14 @@ def split_drives(
     heads = {folder: _head(folder, pattern) if pattern else "" for folder in dict.fromkeys(folders)}
     if pattern and not any(heads.values()):
         raise UsageError(f"--groups {groups}: matches no folder of the frames, such as {next(iter(heads))}")
-    keys = [
-        (heads[folder] or folder, kind)
-        for folder, kind in zip(folders, kinds or [""] * len(files), strict=True)
-    ]
-    drives = {key: number for number, key in enumerate(dict.fromkeys(keys))}
-    numbers = np.fromiter(map(drives.__getitem__, keys), np.intp, len(files))
-    order = np.argsort(numbers, kind="stable")
-    places = np.split(order, np.searchsorted(numbers[order], np.arange(1, len(drives))))
+    drives = defaultdict[tuple[str, str], list[int]](list)
+    for place, (folder, kind) in enumerate(zip(folders, kinds, strict=True)):
+        drives[heads[folder] or folder, kind].append(place)
     few = groups == AUTO and len(files) < _FRAMES_OF_A_DRIVE * len(drives)
-    if few and (rolls is None or not _differ([rolls[each] for each in places])):
+    if few and not _differ([rolls[places] for places in drives.values()]):
         return [("", np.arange(len(files)))]
-    texts = (f"{folder} ({kind})" if kind and folder else folder or kind for folder, kind in drives)
-    return list(zip(texts, places, strict=True))
+    names = (f"{folder} ({kind})" if kind and folder else folder or kind for folder, kind in drives)
+    return list(zip(names, map(np.array, drives.values()), strict=True))
 
 
 def _differ(groups: Sequence[NDArray[np.float64]]) -> bool:
