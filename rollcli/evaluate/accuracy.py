@@ -21,7 +21,6 @@ from rollcli.files.naming import listed
 from rollcli.files.results import Result, Row, csv_table, read_result, run_path
 from rollcli.files.search import Search
 from rollcli.files.storage import is_stream, write_output
-from rollcli.messages import say
 from rollcli.run.outputs import listed_only
 from rollcli.run.resume import recorded_options
 
@@ -361,9 +360,7 @@ def run_accuracy(options: AccuracyOptions) -> ExitStatus:
     if listed_only(lambda: [([result, truth, *folders], writes)], running):
         return ExitStatus.DONE
     found = replace(assess(read.rows, known, result), heights=_heights(read.rows, known, folders, options))
-    if not running.quiet:
-        _name_unmatched(found, options)
-        _count_bent(read.rows, known, truth)
+    running.note(*_not_compared(found, read.rows, known, options))
     data = FORMATS[options.format](found).encode("utf-8", "surrogateescape")
     write_output(options.output, data, overwrite=running.overwrite)
     return ExitStatus.FRAMES_FAILED if found.no_angle else ExitStatus.DONE
@@ -398,21 +395,22 @@ def _heights(
     return found or {}
 
 
-def _name_unmatched(found: Comparison, options: AccuracyOptions) -> None:
-    """Say which frames could not be compared: the first few by name."""
+def _not_compared(
+    found: Comparison, rows: Sequence[Row], known: Mapping[str, KnownPose], options: AccuracyOptions
+) -> Iterator[str]:
+    """Yield which frames could not be compared, the first few by name; and of how many the pose could not.
+
+    It could not where the road bends away from that below the camera.
+    """
     for names, where, what in (
         (found.no_angle, options.truth, f"no angle in {options.result}"),
         (found.no_truth, options.result, f"no known angle in {options.truth}"),
     ):
         if names:
             frames = "1 frame has" if len(names) == 1 else f"{len(names)} frames have"
-            say(f"{where}: {frames} {what}: {listed(names)}")
-
-
-def _count_bent(rows: Sequence[Row], known: Mapping[str, KnownPose], truth: str) -> None:
-    """Say how many poses are not compared because the road bends away from that below the camera."""
+            yield f"{where}: {frames} {what}: {listed(names)}"
     posed = (known.get(stem_of(row.file)) for row in rows if row.pitch_deg is not None)
     bent = sum(pose is not None and pose.bends for pose in posed)
     if bent:
         frames = "1 frame, whose road bends" if bent == 1 else f"{bent} frames, whose roads bend"
-        say(f"{truth}: pitch and height are not compared on {frames} (curvature_per_m)")
+        yield f"{options.truth}: pitch and height are not compared on {frames} (curvature_per_m)"

@@ -24,7 +24,7 @@ from rollcli.evaluate.options import PaperOptions
 from rollcli.evaluate.truth import KnownPose
 from rollcli.files.inputs import stem_of
 from rollcli.files.results import Row
-from rollcli.run.frame import Frame, FrameResult, failed_frame
+from rollcli.run.frame import Frame, FrameResult
 from rollcli.run.read import FRAME_ERRORS, Source, frame_of_error, read_source
 
 
@@ -339,8 +339,3 @@ def time_file(frame: Frame, options: PaperOptions) -> Times:
 def _usable_pixels(source: Source) -> NDArray[Any]:
     """Clear the pixels of a map, shape (H, W), that may not be used: 0 is no data."""
     return np.where(True if source.allowed is None else source.allowed, source.disparity, 0)
-
-
-def lost(frame: Frame, reason: str) -> Examined:
-    """Return what is known of a map that could not be examined."""
-    return failed_frame(frame, reason), None

@@ -6,7 +6,7 @@ from functools import partial
 
 from rollcli import __version__
 from rollcli.errors import ExitStatus, UsageError
-from rollcli.evaluate.experiments import Examined, Findings, Times, examine_file, lost, time_file
+from rollcli.evaluate.experiments import Examined, Findings, Times, examine_file, time_file
 from rollcli.evaluate.options import PaperOptions
 from rollcli.evaluate.paper_tables import DELTAS_DEG, METHOD_NAMES, SOLVER_NAMES, all_tables, table_csv
 from rollcli.evaluate.truth import KnownPose, read_truth
@@ -16,7 +16,7 @@ from rollcli.files.results import Row
 from rollcli.files.storage import write_output
 from rollcli.files.stores.locations import within
 from rollcli.run.find import find_frames
-from rollcli.run.frame import Frame
+from rollcli.run.frame import Frame, failed_frame
 from rollcli.run.outputs import check_places, listed_only
 from rollcli.run.progress import Progress
 from rollcli.run.workers.chunks import Work, Workers
@@ -52,7 +52,10 @@ def run_paper(options: PaperOptions) -> ExitStatus:
         raise UsageError("--encoding depth: the experiments are made on disparity maps, not on depth maps")
     frames, folder = find_frames(options), options.output
     check_places(frames, options.folders)
-    truth = _known_angles(frames, options)
+    truth = {} if options.truth is None else read_truth(options.truth)
+    unknown = [frame.file for frame in frames if stem_of(frame.file) not in truth]
+    if unknown and options.truth is not None:
+        raise UsageError(f"{unknown[0]}: has no known angle in {options.truth}")
     kind = options.figure
     names = [f"{name}.{kind}" for name in FIGURES] if kind is not None else []
     writes = [within(folder, name) for name in (*(f"{name}.csv" for name in TABLES), *names, PAGE)]
@@ -62,18 +65,9 @@ def run_paper(options: PaperOptions) -> ExitStatus:
     return _run(frames, truth, options)
 
 
-def _known_angles(frames: Sequence[Frame], options: PaperOptions) -> Mapping[str, KnownPose]:
-    if options.truth is None:
-        return {}
-    truth = read_truth(options.truth)
-    for frame in frames:
-        if stem_of(frame.file) not in truth:
-            raise UsageError(f"{frame.file}: has no known angle in {options.truth}")
-    return truth
-
-
 def _run(frames: Sequence[Frame], truth: Mapping[str, KnownPose], options: PaperOptions) -> ExitStatus:
-    work = Work(partial(examine_file, options=options, truth=truth), lost)
+    examined_by = partial(examine_file, options=options, truth=truth)
+    work = Work(examined_by, lambda frame, reason: (failed_frame(frame, reason), None))
     progress = Progress(len(frames), options, statuses=("ok",))
     examined: list[Examined] = []
     with (
