@@ -41,8 +41,14 @@ def draw_disparity(disparity: NDArray[Any]) -> Pixels:
     ndarray of uint8, shape (H, W, 3)
         BGR.
     """
-    colours = _colours().reshape(256, 1, 3)
-    return cv2.applyColorMap(_levels(disparity), colours).astype(np.uint8, copy=False)
+    values = np.asarray(disparity)
+    # 0 for no data, 1..255 for small to large disparities
+    top, levels = brightest(values), np.empty(values.shape, np.uint8)
+    for rows in strips(len(values), _BLOCK // max(1, values.shape[1])):
+        some = values[rows]
+        valid = np.isfinite(some) & (some > 0)
+        levels[rows] = np.where(valid, np.clip(np.where(valid, some, 0) * (255 / top), 1, 255), 0)
+    return cv2.applyColorMap(levels, _colours().reshape(256, 1, 3)).astype(np.uint8, copy=False)
 
 
 def draw_road(disparity: NDArray[Any], mask: NDArray[Any], photo: NDArray[Any] | None = None) -> Pixels:
@@ -135,17 +141,6 @@ def brightest(values: NDArray[Any]) -> float:
     """Return the disparity that gets the brightest colour, px: a few outliers must not darken the rest."""
     valid = np.isfinite(values) & (values > 0)
     return float(np.percentile(values[valid], 99)) if valid.any() else 1.0
-
-
-def _levels(disparity: NDArray[Any]) -> Pixels:
-    """Return 0 for no data, 1..255 for small to large disparities."""
-    values = np.asarray(disparity)
-    top, levels = brightest(values), np.empty(values.shape, np.uint8)
-    for rows in strips(len(values), _BLOCK // max(1, values.shape[1])):
-        some = values[rows]
-        valid = np.isfinite(some) & (some > 0)
-        levels[rows] = np.where(valid, np.clip(np.where(valid, some, 0) * (255 / top), 1, 255), 0)
-    return levels
 
 
 def _colours() -> Pixels:

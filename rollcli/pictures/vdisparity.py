@@ -1,7 +1,6 @@
 """v-disparity [VD]: the histogram of each row's disparities, as counts and as a picture."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -206,22 +205,16 @@ def _with_margins(chart: Pixels, top: float, unit: int) -> Pixels:
     left, tick = LEFT_MARGIN * unit, 4 * unit
     picture = np.full((height + BOTTOM_MARGIN * unit, left + width, 3), 255, np.uint8)
     picture[:height, left:] = chart
-    for row in _ticks(float(height), float(_LABEL_EVERY[1] * unit)):
+    for row in np.arange(0, height, round_step(_LABEL_EVERY[1] * unit)):
         cv2.line(picture, (left - tick, int(row)), (left - 1, int(row)), INK, unit)
         _write(picture, f"{row:g}", left - 7 * unit, max(int(row) + 4 * unit, 9 * unit), unit, align=1.0)
-    for disparity in _ticks(top, _LABEL_EVERY[0] * unit * top / width):
+    for disparity in np.arange(0, top, round_step(_LABEL_EVERY[0] * unit * top / width)):
         column = left + round(disparity * width / top)
         cv2.line(picture, (column, height), (column, height + tick - 1), INK, unit)
         _write(picture, f"{disparity:g}", column, height + 14 * unit, unit, align=0.5)
     _write(picture, "disparity, px", left + width // 2, height + 27 * unit, unit, align=0.5)
     _write(picture, "row", left - 7 * unit, height + 27 * unit, unit, align=1.0)
     return picture
-
-
-def _ticks(end: float, least_step: float) -> Iterator[float]:
-    """Yield round numbers from 0 up to `end`, at least `least_step` apart: steps of 1, 2 or 5 times 10^n."""
-    step = round_step(least_step)
-    yield from (number * step for number in range(int(end / step) + 1) if number * step < end)
 
 
 def _write(picture: Pixels, text: str, column: int, row: int, unit: int, *, align: float) -> None:
