@@ -35,7 +35,7 @@ def build_scene(spec: FrameSpec) -> Scene:
         _lay_road(site, _HORIZON, beside)
     else:
         _lay_road(site, FAR)
-        for side, edge in carriageway.sides:
+        for side, edge in ((-1, carriageway.left), (1, carriageway.right)):
             _ROADSIDES[spec.scene](site, side, edge, beside)
         site.add_cars()
         site.add_backdrop()

@@ -108,11 +108,6 @@ class Carriageway:
     relief: Relief | None = None
 
     @property
-    def sides(self) -> tuple[tuple[int, float], tuple[int, float]]:
-        """The two sides: -1 with the left edge, 1 with the right edge."""
-        return (-1, self.left), (1, self.right)
-
-    @property
     def fit_ahead(self) -> list[float]:
         """What `lane_plane` fits to the unevenness of the lane ahead, metres; zeros on a smooth road."""
         return [0.0] * 4 if self.relief is None else lane_plane(self.relief)
