@@ -13,7 +13,7 @@ import numpy as np
 from rollcli.files.containers import is_rest
 from rollcli.files.results import Row
 from rollcli.pictures.overlay import round_step
-from rollcli.report.page import Chart, scatter
+from rollcli.report.page import Chart
 from rollcli.report.summary import degrees, with_interval
 from rollcli.rig.drive.assess import RigAssessment, seconds_of
 from rollcli.rig.quantities import ALIGNMENT, QUANTITIES, ROLL, Quantity
@@ -107,10 +107,12 @@ def rig_traces(
         As plotly takes them; empty ones are left out.
     """
     name = quantity.name.replace("_", " ")
-    band = _trace("mounting, 95 %", **_BAND, line={"width": 0})
-    means = _trace("mounting", text=[], hovertemplate=_TEXT, line={"color": "@c3", "width": 2})
+    band = _trace("mounting, 95 %", "lines", [], [], **_BAND, line={"width": 0})
+    means = _trace(
+        "mounting", "lines", [], [], text=[], hovertemplate=_TEXT, line={"color": "@c3", "width": 2}
+    )
     dashes = {"color": "@error", "width": 1.5, "dash": "dash"}
-    jumps = _trace("jump", text=[], hovertemplate=_TEXT, line=dashes)
+    jumps = _trace("jump", "lines", [], [], text=[], hovertemplate=_TEXT, line=dashes)
     for drive in rig.drives:
         found = drive.quantities.get(quantity.name)
         for segment in found.segments if found is not None else ():
@@ -129,8 +131,8 @@ def rig_traces(
     return [trace for trace in (band, means, jumps) if trace["x"]]
 
 
-def _trace(name: str, **look: Any) -> Trace:
-    return scatter(name, "lines", [], [], **look)
+def _trace(name: str, mode: str, x: Sequence[Any], y: Sequence[Any], **look: Any) -> Trace:
+    return {"type": "scatter", "mode": mode, "name": name, "x": x, "y": y, **look}
 
 
 def _add(trace: Trace, x: Sequence[float], y: Sequence[float], text: str = "") -> None:
@@ -259,7 +261,7 @@ def alignment(rows: Sequence[Row], rig: RigAssessment) -> Chart:
             for _, row, value, each in known
         ]
         dots = {"color": colour, "size": 5 if len(rows) <= _MANY else 2.5}
-        data.append(scatter(words, "markers", x, y, customdata=said, hovertemplate=_SAID, marker=dots))
+        data.append(_trace(words, "markers", x, y, customdata=said, hovertemplate=_SAID, marker=dots))
         if known:
             factor, line = float(np.median([each for *_, each in known])), {"color": colour, "width": 2}
             look = {"name": f"{words}, over the drive", "showlegend": False, "line": line}
@@ -316,7 +318,7 @@ def chart_over_frames(rows: Sequence[Row], quantity: Quantity, rig: RigAssessmen
             None if at is None else label(rows[at], with_interval(values[at], halves[at], quantity))
             for at in places
         ]
-        return scatter(name, mode, x, y, customdata=said, hovertemplate=_SAID, **look)
+        return _trace(name, mode, x, y, customdata=said, hovertemplate=_SAID, **look)
 
     bars: Trace = {"type": "data", "array": [halves[at] or 0.0 for at in suspect], "color": "@suspect"}
     bars |= {"thickness": 1, "width": 0}
@@ -324,7 +326,8 @@ def chart_over_frames(rows: Sequence[Row], quantity: Quantity, rig: RigAssessmen
     edge = {"y": [_FAILED_AT] * len(failed), "yaxis": "y2"}  # they have no value
     reasons = [label(rows[at], "") for at in failed]
     stretches = _stretches(sure, starts)
-    band = _trace("95 % interval", **_BAND, line={"color": "@band", "width": 1})  # a frame alone is seen too
+    edges = {"color": "@band", "width": 1}  # a frame alone is seen too
+    band = _trace("95 % interval", "lines", [], [], **_BAND, line=edges)
     for stretch in _stretches([at for at in sure if halves[at] is not None], starts):
         _add_band(band, *([each[at] for at in stretch] for each in (axis.places, values, halves)))
     line = {"line": {"color": "@c1", "width": 1.5}, "marker": {"color": "@c1"}}

@@ -59,11 +59,6 @@ class Chart:
         )
 
 
-def scatter(name: str, mode: str, x: Any, y: Any, **look: Any) -> dict[str, Any]:
-    """Return a trace of a chart: a line, marks or both."""
-    return {"type": "scatter", "mode": mode, "name": name, "x": x, "y": y, **look}
-
-
 def script_json(value: Any) -> str:
     """Return JSON for a script element, which file names in it cannot end."""
     content = json.dumps(value, allow_nan=False)

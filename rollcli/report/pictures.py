@@ -83,11 +83,6 @@ def take_pictures(subject: Subject) -> Pictures:
     return Pictures({name: _encoded(each) for name, each in drawn.items() if each is not None}, missing)
 
 
-def no_pictures(_: Subject, reason: str) -> Pictures:
-    """Those of a frame whose worker died."""
-    return Pictures({}, reason)
-
-
 def _attempt(make: Callable[[], Made]) -> tuple[Made | None, str]:
     try:
         return make(), ""

@@ -2,7 +2,6 @@
 
 import contextlib
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from rollcli.errors import ExitStatus, UsageError
 from rollcli.extras import require_extra
@@ -13,6 +12,7 @@ from rollcli.messages import counted
 from rollcli.report.charts import all_charts
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import Chart
+from rollcli.report.pictures import Pictures, take_pictures
 from rollcli.report.sources import Subject, choose, subjects
 from rollcli.report.summary import common_run
 from rollcli.rig.drive.assess import RigAssessment, assess_rig
@@ -23,9 +23,6 @@ from rollcli.run.rig import order_of, require_rows, unfinished
 from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import stop_on_signals
 from rollcli.run.workers.tasks import run_tasks
-
-if TYPE_CHECKING:
-    from rollcli.report.pictures import Pictures
 
 _REASONS = 3  # how many are told
 
@@ -136,13 +133,11 @@ def _write(
     return ExitStatus.FRAMES_FAILED if missing else ExitStatus.DONE
 
 
-def _take(found: Sequence[Subject], jobs: int | None) -> "list[Pictures]":
+def _take(found: Sequence[Subject], jobs: int | None) -> list[Pictures]:
     """Return the pictures of each subject, fewer when interrupted."""
-    from rollcli.report.pictures import no_pictures, take_pictures
-
     # as a video is decoded
     places = sorted(range(len(found)), key=lambda place: natural_key(found[place].frame.file))
-    work = Work(take_pictures, no_pictures)
+    work = Work(take_pictures, lambda _, reason: Pictures({}, reason))
     with stop_on_signals() as stop:
         tasks = run_tasks([found[place] for place in places], work, stop, Workers(jobs))
         with contextlib.closing(tasks) as taken:

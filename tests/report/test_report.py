@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from rollcli.files.results import read_result
-from rollcli.report import pictures
+from rollcli.report import pictures, run
 from tests.report.results import row, write_result
 from tests.run_cli import interrupt_in, road_map, rollcli, write_kitti, write_maps
 from tests.slow import mostly_slow
@@ -156,7 +156,7 @@ def test_a_road_that_the_result_was_not_made_from_is_not_shown(tmp_path):
 
 
 def test_an_interrupted_report_writes_nothing(folder, monkeypatch):
-    interrupt_in(monkeypatch, pictures, "take_pictures")
+    interrupt_in(monkeypatch, run, "take_pictures")
     done = report(folder, "out/rolls.csv")
     assert (done.status, done.err) == (130, "rollcli: interrupted; nothing is written\n")
     assert not (folder / "page.html").exists()
