@@ -25,7 +25,7 @@ DOORS = {
     "rollcli.files.containers": "loads the reader of bags, an extra, and NumPy only for bags",
     "rollcli.run.find": "loads the reader of bags, an extra, only for them, and NumPy for an image's size",
     "rollcli.files.storage": "urllib loads only for URLs of web servers",
-    "rollcli.report.run": "loads the page and its pictures once the request is checked",
+    "rollcli.report.run": "loads the page and its figures, an extra, once the request is checked",
     "rollcli.run.frame_task": "matplotlib, an extra, loads only for figures",
     "rollcli.run.batch": "a worker's door; decodes videos in place of workers, which loads OpenCV",
     "rollcli.run.library": "loads the readers of recordings only for them",

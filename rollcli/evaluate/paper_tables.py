@@ -34,11 +34,10 @@ def table_csv(table: Table) -> bytes:
     return csv_table([table[0], *([_text(name, value) for name, value in row.items()] for row in table)])
 
 
-def _text(column: str, value: Value) -> str:
+def _text(column: str, value: Value) -> Value:
     if isinstance(value, float):
         return f"{value:.7g}"
-    text = "" if value is None else str(value)
-    return _WHOLE_NAMES.get(column, {}).get(text, text)
+    return _WHOLE_NAMES.get(column, {}).get(str(value), value)
 
 
 def column(table: Table, name: str, **of: Value) -> list[Any]:
