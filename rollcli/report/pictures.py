@@ -66,16 +66,15 @@ class Pictures:
 def take_pictures(subject: Subject) -> Pictures:
     """Take what can be taken: from the images of the subject, else from its map or pair."""
     source, missing = _attempt(lambda: _source(subject).require_size(subject.frame.file, subject.row))
-    disparity = None if source is None else source.shown
-    level, _ = _attempt(lambda: _level(subject, disparity))
-    makers: dict[str, Callable[[], NDArray[Any] | None]] = {
-        "road": lambda: _road(subject, source),
-        "map": lambda: None if disparity is None else draw_disparity(disparity),
-        "map_counts": lambda: None if disparity is None else _counts(disparity, disparity),
-        "level": lambda: None if level is None else draw_disparity(level),
-        "level_counts": lambda: _level_counts(subject, disparity, level),
-        "heights": lambda: _heights(subject, source),
-    }
+    level, _ = _attempt(lambda: _level(subject, source))
+    makers: dict[str, Callable[[], NDArray[Any] | None]] = {"heights": partial(_heights, subject, source)}
+    if source is not None:
+        makers["road"] = partial(_road, subject, source)
+        makers["map"] = partial(draw_disparity, source.shown)
+        makers["map_counts"] = partial(_counts, source.shown, source.shown)
+    if level is not None:
+        makers["level"] = partial(draw_disparity, level)
+        makers["level_counts"] = partial(_level_counts, subject, source, level)
     for name, kind in _WRITTEN.items():
         if kind in subject.images:
             makers[name] = partial(read_image, subject.images[kind])
@@ -115,9 +114,9 @@ def _read(subject: Subject, options: FramesOptions, kind: str = "") -> Source:
     return read_source(frame, options)
 
 
-def _road(subject: Subject, source: Source | None) -> NDArray[Any] | None:
+def _road(subject: Subject, source: Source) -> NDArray[Any] | None:
     """Draw the road on the left image of a pair, found again."""
-    if source is None or source.photo is None:
+    if source.photo is None:
         return None
     request = subject.options.method.request(calibration=source.calibrated(subject.frame.calibration))
     found = estimate_roll(source.disparity, request, mask=source.allowed, road_mask=True)
@@ -127,23 +126,19 @@ def _road(subject: Subject, source: Source | None) -> NDArray[Any] | None:
     return draw_road(source.shown, found.road_mask, source.photo)
 
 
-def _level(subject: Subject, disparity: NDArray[Any] | None) -> NDArray[Any] | None:
+def _level(subject: Subject, source: Source | None) -> NDArray[Any] | None:
     """Return the map de-rotated: as `estimate` wrote it, else made."""
     if "derotated" in subject.images:
         given = EncodingOptions() if subject.frame.right_file else subject.options.encoding
         return _read(subject, FramesOptions(encoding=given), "derotated").disparity
-    return None if disparity is None else derotate(disparity, subject.theta)
+    return None if source is None else derotate(source.shown, subject.theta)
 
 
-def _level_counts(
-    subject: Subject, disparity: NDArray[Any] | None, level: NDArray[Any] | None
-) -> NDArray[Any] | None:
-    if level is None:
-        return None
+def _level_counts(subject: Subject, source: Source | None, level: NDArray[Any]) -> NDArray[Any]:
     height, width = level.shape
     column, alpha = MiddleColumn.of_level(subject.theta, width, height), subject.row.alpha
-    curve = None if alpha is None else column.profile(alpha)
-    return _counts(level, level if disparity is None else disparity, curve)
+    scale = level if source is None else source.shown
+    return _counts(level, scale, None if alpha is None else column.profile(alpha))
 
 
 def _heights(subject: Subject, source: Source | None) -> NDArray[Any] | None:
@@ -169,11 +164,7 @@ def _heights(subject: Subject, source: Source | None) -> NDArray[Any] | None:
     return draw_heights(steadied(heights) if subject.frame.right_file else heights, span, unit, photo)
 
 
-def _counts(
-    disparity: NDArray[Any],
-    scale: NDArray[Any],
-    curve: Parabola | None = None,
-) -> NDArray[Any]:
+def _counts(disparity: NDArray[Any], scale: NDArray[Any], curve: Parabola | None = None) -> NDArray[Any]:
     """Draw the v-disparity from 0 to the largest disparity of `scale`, so that two can be compared."""
     histogram = v_disparity(scale)
     bins = min(histogram.counts.shape[1], _MOST_BINS)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from rollcli.errors import ExitStatus, UsageError
 from rollcli.extras import require_extra
 from rollcli.files.naming import listed, natural_key
-from rollcli.files.results import Result, Row, read_result, run_path
+from rollcli.files.results import Result, Row, read_result
 from rollcli.files.storage import is_stream, write_output
 from rollcli.messages import counted
 from rollcli.report.charts import all_charts
@@ -18,7 +18,6 @@ from rollcli.report.summary import common_run
 from rollcli.rig.drive.assess import RigAssessment, assess_rig
 from rollcli.run.outputs import check_named_once, listed_only
 from rollcli.run.progress import TaskProgress
-from rollcli.run.resume import recorded_calibrations, recorded_options
 from rollcli.run.rig import order_of, require_rows, unfinished
 from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import stop_on_signals
@@ -154,11 +153,7 @@ def _subjects(
     """
     found: dict[int, Subject] = {}
     for number, part in enumerate(parts):
-        made = recorded_options(part.run, run_path(part.path))
         mine = {place: row for place, owner, row in chosen if owner == number}
-        if mine or len(parts) == 1:
-            calibrations = recorded_calibrations(part.run)
-            one = calibrations[0] if len(calibrations) == 1 else None  # else each frame has its own
-            of_part = subjects([*mine.values()], part.path, options.images, made, one, fetch=options.fetch)
-            found |= zip(mine, of_part, strict=True)
+        of_part = subjects([*mine.values()], part, options.images, fetch=options.fetch)
+        found |= zip(mine, of_part, strict=True)
     return [found[place] for place, _, _ in chosen]

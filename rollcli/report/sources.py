@@ -10,12 +10,12 @@ from rollcli.errors import UsageError
 from rollcli.files.atomic import is_file, is_folder
 from rollcli.files.containers import frame_name
 from rollcli.files.naming import listed
-from rollcli.files.results import Row
+from rollcli.files.results import Result, Row, run_path
 from rollcli.files.search import MAP_ENDINGS, objects_behind
 from rollcli.files.stores.locations import base_name, is_remote, is_url, store_of
-from rollcli.rig.calibration import Calibration
 from rollcli.run.frame import Frame, frame_of_row
 from rollcli.run.options import KINDS, FramesOptions, ImageKind, ImageOptions
+from rollcli.run.resume import recorded_calibrations, recorded_options
 from rollcli.simulate.options import TRUTH
 
 JUMP, WIDEST, SUSPECT, SPREAD = "around a jump", "widest interval", "suspect", "evenly spread"
@@ -93,28 +93,17 @@ class Subject:
         return math.radians(self.row.map_roll_deg or 0.0)
 
 
-def subjects(
-    rows: Sequence[Row],
-    result: str,
-    images: str | None,
-    options: FramesOptions,
-    calibration: Calibration | None = None,
-    *,
-    fetch: bool = False,
-) -> list[Subject]:
-    """Find the files of rows that have an angle.
+def subjects(rows: Sequence[Row], result: Result, images: str | None, *, fetch: bool) -> list[Subject]:
+    """Find the files of rows of a result that have an angle.
 
     Parameters
     ----------
     rows : sequence of Row
-    result : str
-        The result's path: names that do not exist from here are looked for beside it.
+    result : Result
+        Its path: names that do not exist from here are looked for beside it. And its run: how it was made,
+        which folders it wrote images to, and its calibration, where all rows have one.
     images : str or None
         The folder of images, or of folders of images, that `estimate` wrote.
-    options : FramesOptions
-        How the result was made, and which folders the run wrote images to.
-    calibration : Calibration or None
-        Of all rows.
     fetch : bool
         Whether inputs are asked for in whichever store a row names: a result from elsewhere may name a
         service of this network, or a bucket that the user's keys open. By default only in the result's own.
@@ -123,7 +112,12 @@ def subjects(
     ------
     UsageError
         There is no such folder, or there are no images of some rows in it.
+    InputError
+        The record of the run is none.
     """
+    options = recorded_options(result.run, run_path(result.path))
+    calibrations = recorded_calibrations(result.run)
+    calibration = calibrations[0] if len(calibrations) == 1 else None  # else each frame has its own
     there = None if images is None else _ImageFolder(images)
     found = [_images(row, there, options.images) if there is not None else {} for row in rows]
     without = [row.file for row, files in zip(rows, found, strict=True) if images is not None and not files]
@@ -132,9 +126,9 @@ def subjects(
             f"{images}: has no image of {listed(without)}: name the folder where estimate has put what it "
             "wrote, or leave --images out to have the pictures made from the inputs"
         )
-    frames = [frame_of_row(row, result)._replace(calibration=calibration) for row in rows]
+    frames = [frame_of_row(row, result.path)._replace(calibration=calibration) for row in rows]
     return [
-        Subject(frame, files, row, options, _refusal(row, result, there, fetch))
+        Subject(frame, files, row, options, _refusal(row, result.path, there, fetch))
         for frame, files, row in zip(frames, found, rows, strict=True)
     ]
 

@@ -26,7 +26,6 @@ from rollcli.report.sources import choose, subjects
 from rollcli.report.summary import common_run, degrees, option_lines, with_interval
 from rollcli.rig.drive.assess import assess_rig
 from rollcli.rig.quantities import ALIGNMENT, HEIGHT, ROLL, SIZE
-from rollcli.run.options import EncodingOptions, FramesOptions, ImageOptions
 from tests.recorded import made, recorded_test
 from tests.report.results import row
 from tests.run.rigs import known, rig, sequence, short
@@ -348,10 +347,8 @@ def _looked_for(rows, there="", images=None, result="rolls.csv", inside=".", **f
         folder_of(each for each in there.split() if "://" not in each),
     ):
         os.chdir(inside)
-        recorded = FramesOptions(
-            images=ImageOptions(**{kind: each or None for kind, each in folders.items()})
-        )
-        found = made(subjects, given, result, images, recorded)
+        options = {kind.replace("_", "-"): each or None for kind, each in folders.items()}
+        found = made(subjects, given, Result((), {"options": options}, result), images, fetch=False)
     if isinstance(found, str):
         return found
     paths = [[each.frame.path, each.frame.right_path.replace(os.sep, "/")] for each in found]
@@ -362,13 +359,12 @@ def _subjects():
     """What is taken of rows."""
     rows = [row("/run/a.png"), row("b.c.png", -3.0), row("x/../b.png", None), row("m.mp4#000002")]
     rows[0] = replace(rows[0], alpha2=None)
+    run = {"options": {"derotated": "a/up"}}
     there = "up/run/a.png heights/a.tif vdisparity/a.png vdisparity/b.c.png disparity/a.npy road_mask/b.png"
     with folder_of(f"out/{each}" for each in f"{there} road_mask/m_000002.png".split()):
         return [
             [each.theta, each.row.alpha, each.refused, sorted(each.images.items())]
-            for each in subjects(
-                rows, "rolls.csv", "out/", FramesOptions(images=ImageOptions(derotated="a/up"))
-            )
+            for each in subjects(rows, Result((), run, "rolls.csv"), "out/", fetch=False)
         ]
 
 
@@ -403,7 +399,7 @@ def _views(quantity):
 def _refused():
     rows = [(replace(row(one), right_file=other), result) for one, other, result in INPUTS["remote"]]
     return [
-        [subjects([each], result, None, FramesOptions(), fetch=fetch)[0].refused for fetch in (False, True)]
+        [subjects([each], Result((), None, result), None, fetch=fetch)[0].refused for fetch in (False, True)]
         for each, result in rows
     ]
 
@@ -422,9 +418,8 @@ def _taken(images=(), disparity=ROAD, roll=5.75, camera=None, alpha0=-8.0, **opt
         cv2.imwrite(f"{folder}/photo.png", np.random.default_rng(1).integers(0, 256, (60, 80, 3), np.uint8))
         given = replace(row(f"{folder}/a.npy", roll), alpha0=alpha0, alpha1=0.4, height_m=camera)
         given = replace(given, width=disparity.shape[1], height=disparity.shape[0])
-        drawn = ImageOptions(heights_range=(-0.3, 0.3))
-        settings = FramesOptions(encoding=EncodingOptions("px"), images=drawn)
-        (subject,) = subjects([given], f"{folder}/rolls.csv", None, settings)
+        run = {"options": {"encoding": "px", "heights-range": [-0.3, 0.3]}}
+        (subject,) = subjects([given], Result((), run, f"{folder}/rolls.csv"), None, fetch=False)
         subject = replace(subject, images={kind: f"{folder}/{name}" for kind, name in images}, **options)
         with mock.patch.object(cv2, "putText", lambda picture, *_: picture):
             found = pictures.take_pictures(subject)
