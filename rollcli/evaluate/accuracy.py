@@ -275,20 +275,21 @@ def as_table(found: Comparison) -> str:
     ]
     for name, part, unit in (("pitch", found.pitch, "degrees"), ("height", found.height, "m")):
         if part is not None:
-            lines += [
-                (f"{name}, frames compared", str(part.count)),
-                *_lines(f"{name}, ", part, unit),
-                (f"{name}, in its interval", _percent(part.coverage_95, part.intervals)),
-            ]
+            lines += _lines(f"{name}, ", part, unit)
+            lines.append((f"{name}, in its interval", _percent(part.coverage_95, part.intervals)))
     for distance, part in found.heights.items():
-        name = f"heights, {distance} m, "
-        lines += [(f"{name}frames compared", str(part.count)), *_lines(name, part, "m")]
+        lines += _lines(f"heights, {distance} m, ", part, "m")
     width = 2 + max(len(name) for name, _ in lines)
     return "".join(f"{name:{width}}{value}\n" for name, value in lines)
 
 
 def _lines(name: str, part: Accuracy, unit: str) -> Iterator[tuple[str, str]]:
-    """Yield the figures of a quantity in words; of roll, which has no name, with the frame of the worst."""
+    """Yield the figures of a quantity in words; of roll, which has no name, with the frame of the worst.
+
+    How many frames it is of is said of roll beside those that are left out.
+    """
+    if name:
+        yield f"{name}frames compared", str(part.count)
     for figure, words in _LENGTHS.items():
         value, more = getattr(part, figure), "" if name or figure != "worst" else f"  {part.worst_file}"
         yield f"{name}{words}", "-" if value is None else f"{value:.4f} {unit}{more}"
