@@ -154,15 +154,13 @@ class Ground(Surface):
 
     def _first_smooth_hit(self, origin: Array, direction: Array) -> Array:
         """Return the same for the sheet without its relief."""
+        if self.camber and self.course.bend:
+            return self._first_cambered_hit(origin, direction)
         (ox, oy, oz), (rx, ry, rz) = origin, direction
         lean = self.slope * self.course.bend - self.course.curvature
         a = lean / 2 * rz * rz
         b = ry - self.slope * (rx - self.course.heading * rz) + lean * oz * rz
         c = oy - self.slope * (ox - self.course.heading * oz) + lean / 2 * oz * oz - self.offset
-        if not self.camber:
-            return first_root(a, b, c)
-        if self.course.bend:
-            return self._first_cambered_hit(origin, direction)
         # along a ray, lateral = l0 + l1 t, and the camber adds its square
         l0, l1 = ox - oz * self.course.heading, rx - rz * self.course.heading
         half = self.camber / 2
