@@ -179,10 +179,9 @@ def heights_over(disparity: NDArray[Any], road: FittedRoad, calibration: Calibra
             f"{size} px of {disparity.dtype} are no map of real numbers of {road.width}x{road.height} px, "
             "as the road was fitted to"
         )
+    heights = np.full(disparity.shape, np.nan, np.float32)
     if calibration is not None:
         calibration = calibration.for_size(road.width, road.height)
-    heights = np.full(disparity.shape, np.nan, np.float32)
-    if calibration is not None and calibration.doffs != 0:
         a0, a1, a2 = road.model.alpha
         model = road.model._replace(alpha=(a0 + calibration.doffs, a1, a2))
         disparity, road = from_infinity(disparity, calibration.doffs), replace(road, model=model)
