@@ -298,8 +298,10 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
                 if (path, message.topic) not in places:
                     with contextlib.suppress(InputError):  # the next one says the same
                         info = messages.camera_info(topics[message.topic], message.data)
-                        cameras.setdefault(message.topic, info)
-                        places[path, message.topic] = place
+                        if info.has_p:  # a driver may write zeros until its calibration is loaded
+                            places[path, message.topic] = place
+                        if not (message.topic in cameras and cameras[message.topic].has_p):
+                            cameras[message.topic] = info
                 continue
             stamp = messages.stamp_of(topic, message.data, message.log_time)
             name = f"{path}#{topic.name}@{stamp}"

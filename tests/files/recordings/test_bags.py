@@ -141,8 +141,8 @@ def test_raw_views_are_rectified_and_a_line_says_so(tmp_path, transport):
 
     def make(store):
         for side, p in (("left", P), ("right", P_RIGHT)):
-            info = camera_info(store, START, (width, height), p, d, k.ravel())
-            yield f"/{side}/camera_info", START, info
+            yield f"/{side}/camera_info", START, camera_info(store, START, (0, 0), np.zeros(12))  # not loaded
+            yield f"/{side}/camera_info", START, camera_info(store, START, (width, height), p, d, k.ravel())
             if transport:
                 png = cv2.imencode(".png", raw[side])[1].tobytes()
                 yield f"/{side}/image_raw/compressed", START, compressed(store, png, "mono8; png", START)
