@@ -355,7 +355,9 @@ def _calibrate(
         return
     p, doffs = left.p, 0.0
     if right is not None and right.usable and right.across != left.across:
-        baseline, doffs = abs(left.across - right.across), right.p[2] - p[2]
+        baseline = abs(left.across - right.across)
+        if right.pairs_with(left):  # not so beside depths that are aligned to colours
+            doffs = right.p[2] - p[2]
         if right.across > left.across:
             bag.notes.append(f"{name}: the right view's Tx is positive, against ROS: its size is taken")
     size, source = (left.width or None, left.height or None), f"CameraInfo of {name}"

@@ -76,6 +76,11 @@ class CameraInfo(NamedTuple):
         """How far the origin of P, which may be a third camera, stands to the right of this one, m."""
         return (self.p[3] - self.p[2] * self.p[11]) / self.p[0]
 
+    def pairs_with(self, other: "CameraInfo") -> bool:
+        """Tell whether both have the P of one rectified pair: what differs is along the rows alone."""
+        mine, others = (np.take(each.p, (0, 5, 6)) for each in (self, other))  # focal lengths and cy
+        return np.allclose(mine, others, rtol=0, atol=_ALIKE_PX)
+
     @property
     def changes_raw_views(self) -> bool:
         """Whether a raw view is not the rectified one."""

@@ -310,15 +310,16 @@ def test_one_camera_gives_the_calibration_of_maps_that_state_their_baseline(tmp_
     ("names", "across"), [("ab", (22.4, -168.0)), ("ab", (190.4, 0.0)), (("left", "right"), (0.0, 190.4))]
 )
 def test_maps_of_cameras_whose_p_refers_to_another_one_have_a_calibration(tmp_path, names, across):
-    """Or whose right one has its Tx with the wrong sign."""
+    """Or whose right one has its Tx with the wrong sign, or sees other pixels, as beside aligned depths."""
 
     def make(store):
-        for side, x in zip(names, across, strict=True):
-            yield f"/{side}/camera_info", START, camera_info(store, START, (160, 120), (*P[:3], x, *P[4:]))
+        for side, x, zoom in zip(names, across, (1, 1.1), strict=True):
+            p = np.multiply((*P[:3], x, *P[4:]), np.repeat([zoom, 1], [8, 4]))
+            yield f"/{side}/camera_info", START, camera_info(store, START, (160, 120), p)
         yield "/maps", START, image(store, maps(1)[0], "32FC1", START)
 
     (frame,) = package.open_recording(write_bag(tmp_path, "drive", "mcap", make))
-    assert frame.calibration.baseline == pytest.approx(190.4 / 350)
+    assert (frame.calibration.baseline, frame.calibration.doffs) == (pytest.approx(190.4 / 350), 0)
 
 
 def test_a_bag_of_several_files_is_one_drive(tmp_path):
@@ -334,8 +335,7 @@ def test_a_bag_of_several_files_is_one_drive(tmp_path):
                 yield f"/{side}/image_raw", stamp, image(store, view, "mono8", stamp)
                 if number == 0:
                     k = np.diag([350.0, 350, 1]).ravel()
-                    info = camera_info(store, stamp, (160, 120), p, [0.1] * 5, k)
-                    yield f"/{side}/camera_info", stamp, info
+                    yield f"/{side}/camera_info", stamp, camera_info(store, stamp, (160, 120), p, [1] * 5, k)
 
         return make
 
