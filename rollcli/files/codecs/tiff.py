@@ -177,7 +177,9 @@ def decode_tiff(data: bytes) -> Stored:
 
 def picture(data: bytes) -> NDArray[Any]:
     """Return the pixels of a camera image: grey (H, W) or BGR (H, W, 3), uint8 or uint16."""
-    with _first_page(data) as (_, page):
+    with _first_page(data) as (file, page):
+        if _note(file):
+            raise InputError("holds several pages; save the view that is meant as a file of its own")
         colour = page.photometric == _RGB and page.samplesperpixel >= 3
         if not (colour or page.samplesperpixel == 1) or page.photometric == _PALETTE:
             raise InputError("is neither a grey nor an RGB TIFF")
