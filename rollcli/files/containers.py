@@ -121,7 +121,7 @@ def refuse_others(location: str) -> None:
     UsageError
     """
     if location.lower().endswith(BAGS):
-        hint = "name it among INPUTS, not in a list; its views by --left-topic and --right-topic"
+        hint = "name it among INPUTS, not in a list; its views by --left-topic and --right-topic alone"
         raise UsageError(f"{location}: is a bag: {hint}")
     if is_archive(base_name(location)):
         require_local(location, "archives are read from local disk: download it first")
