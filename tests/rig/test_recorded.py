@@ -105,7 +105,7 @@ FOLDERS = {  # of frames, and how many are in each
     "few on average": {"a": 7, "b": 8},
     "uneven": {"a": 1, "b": 15},
     "deep": {"data/run1/x": 9, "data/run2": 9, "data/run1": 3, "other/run3": 4, ".": 2},
-    "of a root": {"/data/run1/x": 9, "/data/run1/y": 9, "s3://data/run1": 9},
+    "of a root": {"/data/run1/x": 9, "/data/run1/y": 9, "s3://data/run1": 9, "/data/run2.zip#": 9},
     "none": {},
 }
 
@@ -115,7 +115,7 @@ def _split(groups):
     found = {}
     for name, counts_of in FOLDERS.items():
         frames = sorted((place, folder) for folder, count in counts_of.items() for place in range(count))
-        files = [f"{folder}/{place}.png".removeprefix("./") for place, folder in frames]
+        files = [f"{folder}/{place}.png".removeprefix("./").replace("#/", "#") for place, folder in frames]
         found[name] = made(split_drives, files, groups, [""] * len(files), np.full(len(files), np.nan))
     return found
 

@@ -356,8 +356,8 @@ def _calibrate(
     p, doffs = left.p, 0.0
     if right is not None and right.usable and right.across != left.across:
         baseline = abs(left.across - right.across)
-        if right.pairs_with(left):  # not so beside depths that are aligned to colours
-            doffs = right.p[2] - p[2]
+        # of maps that are aligned to another camera, as depths to that of colours, it would be by chance
+        doffs = right.p[2] - p[2] if right.pairs_with(left) else 0.0
         if right.across > left.across:
             bag.notes.append(f"{name}: the right view's Tx is positive, against ROS: its size is taken")
     size, source = (left.width or None, left.height or None), f"CameraInfo of {name}"

@@ -27,18 +27,20 @@ _LEAST_SPREAD = 0.05  # degrees
 _FRAME = re.compile(
     r"(.*?\.(?:bag|db3|mcap|mp4|avi|mkv|mov))#(?:.*@([0-9]{1,20})(?:\.[0-9]+)?)?", re.IGNORECASE
 )
+_IN_ARCHIVE = re.compile(r"(.*\.(?:zip|tar))#[^/]*", re.IGNORECASE)  # run1.zip#0001.png, in no folder there
 _NS = 1e-9
 _LEAST_S = 1e-6  # from frame to frame: the stamps of a recorder that has no clock count its frames
 
 
 def drive_of(file: str) -> str:
-    """Return the recording that a frame is of, or its folder.
+    """Return the recording that a frame is of, or its folder or archive.
 
     The files into which rosbag2 splits a recording, ``run/run_0.mcap`` and so on, are one, the folder.
     """
     found = _FRAME.match(file) if "#" in file else None
     if found is None:
-        return file.rpartition("/")[0]
+        archive = _IN_ARCHIVE.fullmatch(file)
+        return archive[1] if archive else file.rpartition("/")[0]
     folder, _, name = found[1].rpartition("/")
     split = re.fullmatch(r"(.+)_[0-9]+\.\w+", name)
     return folder if split is not None and split[1] == folder.rpartition("/")[2] else found[1]
@@ -66,7 +68,7 @@ def split_drives(
     files : sequence of str
         Paths with "/" separators, in the order of the frames.
     groups : str
-        "auto": frames of one folder or recording are one drive, unless they hold hardly a frame each and
+        "auto": frames of one folder, archive or recording are one drive, unless these hold hardly a frame and
         their rolls do not differ beyond their spread; "none": all are one; else a pattern such as
         "data/run*": the folders that it matches are drives, with all below them.
     kinds : sequence of str
