@@ -325,6 +325,11 @@ def is_elsewhere(name: str, row: str, *, of_pair: bool = False) -> bool:
     return least > (1 if made else 0)
 
 
+def _as_path(name: str) -> str:
+    """Write a name as a path: an archive is a folder that is called as it is, but for its ending."""
+    return re.sub(r"\.(?:zip|tar)#", "/", name.replace("\\", "/"), count=1, flags=re.IGNORECASE)
+
+
 def _is_rooted(folders: Sequence[str]) -> bool:
     """Tell whether folders begin at a root, a drive letter or a scheme."""
     return bool(folders) and (folders[0].endswith(":") or folders[0] == "/")
@@ -332,13 +337,13 @@ def _is_rooted(folders: Sequence[str]) -> bool:
 
 def _folders(path: str) -> list[str]:
     """Split a path's folders, without the steps up that a relative one begins with."""
-    parts = PurePosixPath(posixpath.normpath(path.replace("\\", "/"))).parent.parts
+    parts = PurePosixPath(posixpath.normpath(_as_path(path))).parent.parts
     return [part for part in parts if part != ".."]
 
 
 def _parts(path: str) -> list[str]:
     """Split a path from its stem up to the root."""
-    folders = PurePosixPath(path.replace("\\", "/")).parent.parts
+    folders = PurePosixPath(_as_path(path)).parent.parts
     return [stem_of(path), *reversed(folders)]
 
 

@@ -78,8 +78,8 @@ class CameraInfo(NamedTuple):
 
     def pairs_with(self, other: "CameraInfo") -> bool:
         """Tell whether both have the P of one rectified pair: what differs is along the rows alone."""
-        mine, others = (np.take(each.p, (0, 5, 6)) for each in (self, other))  # focal lengths and cy
-        return np.allclose(mine, others, rtol=0, atol=_ALIKE_PX)
+        # focal lengths, and cy
+        return bool(np.ptp(np.take([self.p, other.p], (0, 5, 6), axis=1), axis=0).max() < _ALIKE_PX)
 
     @property
     def changes_raw_views(self) -> bool:

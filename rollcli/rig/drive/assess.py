@@ -27,7 +27,7 @@ _LEAST_SPREAD = 0.05  # degrees
 _FRAME = re.compile(
     r"(.*?\.(?:bag|db3|mcap|mp4|avi|mkv|mov))#(?:.*@([0-9]{1,20})(?:\.[0-9]+)?)?", re.IGNORECASE
 )
-_IN_ARCHIVE = re.compile(r"(.*\.(?:zip|tar))#[^/]*", re.IGNORECASE)  # run1.zip#0001.png, in no folder there
+_IN_ARCHIVE = re.compile(r"(?<=\.(?:zip|tar))#(?=[^/]*$)", re.IGNORECASE)  # of run.zip#0001.png, in no folder
 _NS = 1e-9
 _LEAST_S = 1e-6  # from frame to frame: the stamps of a recorder that has no clock count its frames
 
@@ -39,8 +39,7 @@ def drive_of(file: str) -> str:
     """
     found = _FRAME.match(file) if "#" in file else None
     if found is None:
-        archive = _IN_ARCHIVE.fullmatch(file)
-        return archive[1] if archive else file.rpartition("/")[0]
+        return _IN_ARCHIVE.sub("/", file).rpartition("/")[0]
     folder, _, name = found[1].rpartition("/")
     split = re.fullmatch(r"(.+)_[0-9]+\.\w+", name)
     return folder if split is not None and split[1] == folder.rpartition("/")[2] else found[1]
