@@ -24,10 +24,8 @@ _FRAMES_OF_A_DRIVE = 8  # folders of fewer frames on average are not drives but 
 _APART = 4.0  # standard deviations within a group; medians of a hundred groups of one rig are 3.5 apart
 _LEAST_SPREAD = 0.05  # degrees
 # drive.mcap#/stereo/disparity@1700000000123456789, with .1 where a stamp is there twice; drive.mp4#000123
-_FRAME = re.compile(
-    r"(.*?\.(?:bag|db3|mcap|mp4|avi|mkv|mov))#(?:.*@([0-9]{1,20})(?:\.[0-9]+)?)?", re.IGNORECASE
-)
-_IN_ARCHIVE = re.compile(r"(?<=\.(?:zip|tar))#(?=[^/]*$)", re.IGNORECASE)  # of run.zip#0001.png, in no folder
+_FRAME = re.compile(r"(?i)(.*?\.(?:bag|db3|mcap|mp4|avi|mkv|mov))#(?:.*@([0-9]{1,20})(?:\.[0-9]+)?)?")
+_IN_ARCHIVE = re.compile(r"(?i)(?<=\.(?:zip|tar))#(?=[^/]*$)")  # of run.zip#0001.png, in no folder there
 _NS = 1e-9
 _LEAST_S = 1e-6  # from frame to frame: the stamps of a recorder that has no clock count its frames
 
