@@ -326,8 +326,8 @@ def is_elsewhere(name: str, row: str, *, of_pair: bool = False) -> bool:
 
 
 def _as_path(name: str) -> str:
-    """Write a name as a path: an archive is a folder that is called as it is, but for its ending."""
-    return re.sub(r"\.(?:zip|tar)#", "/", name.replace("\\", "/"), count=1, flags=re.IGNORECASE)
+    """Write a name as a path: an archive, and what is made of it, is a folder that has its name."""
+    return re.sub(r"(?i)\.(?:zip|tar)[#/]", "/", name.replace("\\", "/"))
 
 
 def _is_rooted(folders: Sequence[str]) -> bool:
