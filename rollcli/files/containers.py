@@ -56,13 +56,14 @@ def shown(location: str) -> str:
 
 
 def frame_name(name: str) -> str:
-    """Return the name of a frame below its archive, of a recording's file and stamp; others as they are."""
+    """Return the name of a frame below its archive, or of a map of one of a recording; others as they are."""
     found = _INSIDE.fullmatch(name) if "#" in name else None
     if found is None:
         return name
     if found[1].lower().endswith((*BAGS, *VIDEOS)):
         stem = posixpath.splitext(posixpath.basename(found[1].replace(os.sep, "/")))[0]
-        return f"{stem}_{found[2].rpartition('@')[2].replace('.', '_')}"
+        ending = "png" if "/compressed" in found[2] else "npy"
+        return f"{stem}_{found[2].rpartition('@')[2].replace('.', '_')}.{ending}"
     return found[2]
 
 

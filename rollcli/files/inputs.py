@@ -82,7 +82,7 @@ def find_inputs(inputs: Iterable[str], search: Search, *, files_from: str | None
 
 def named_input(location: str) -> Input:
     """Make the input of a file that was named by itself."""
-    return Input(location, base_name(location) if is_url(location) else Path(location).name)
+    return Input(location, base_name(location) if is_url(location) else Path(frame_name(location)).name)
 
 
 def pair_inputs(

@@ -152,7 +152,7 @@ class Search:
             return self._wanted(argument, self._in_pattern(argument), "pattern")
         if is_archive(argument) and is_file(path):
             return self._wanted(argument, self._in_archive(argument), "archive")
-        return self._named(argument, frame_name(path.name) if "#" in argument else path.name)
+        return self._named(argument, Path(frame_name(argument)).name)
 
     def allows(self, location: str, *, found: bool = False) -> bool:
         """Tell whether --include and --exclude allow a file.

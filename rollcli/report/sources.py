@@ -218,8 +218,8 @@ def _tails(file: str) -> Iterator[str]:
     """Yield the path without its ending, then without its first folder, and so on."""
     inside = frame_name(file)
     holder = file.removesuffix(inside).removesuffix("#")
-    # an archive is a folder; a frame of a recording has no ending, but may have dots
-    path = PurePosixPath(file).parent / f"{inside}.png" if holder == file else PurePosixPath(holder, inside)
+    # an archive is a folder; a recording lies in one
+    path = PurePosixPath(file).parent / inside if holder == file else PurePosixPath(holder, inside)
     parts = path.with_suffix("").parts if path.name else ()  # "/" and "." name no file
     for first in range(1 if path.is_absolute() else 0, len(parts)):
         if ".." not in parts[first:]:  # which would lead out of the folder of images

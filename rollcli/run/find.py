@@ -134,9 +134,8 @@ def mask_finder(mask: str | None) -> Callable[[str], str | None]:
 
 
 def _stem(name: str) -> str:
-    """Return a frame's name without its ending; one of a recording has none, but may have dots."""
-    inside = frame_name(name)
-    return PurePosixPath(inside).stem if name.endswith(inside) else inside
+    """Return a frame's name without folders and ending."""
+    return PurePosixPath(frame_name(name)).stem
 
 
 def _is_broken(name: str) -> bool:
