@@ -128,18 +128,20 @@ def v_disparity_figure(
     titles = ("as it is", "de-rotated by " + f"{math.degrees(theta):.2f}°".replace("-", "−"))
     columns = MiddleColumn.of_map(theta, width), MiddleColumn.of_level(theta, width, height)
     curves = [None if alpha is None else column.profile(alpha) for column in columns]
-    counted = [v_disparity(each, bins=bins, max_disparity=max_disparity) for each in maps]
+    as_it_is = v_disparity(disparity, bins=bins, max_disparity=max_disparity)
+    # to the same end: both are read by the numbers below
+    counted = as_it_is, v_disparity(maps[1], bins=bins, max_disparity=as_it_is.max_disparity)
+    _, end = shown_counts(as_it_is, _COLUMNS)
     with drawing_style(PRINT):
         tall = 2 * _MAP_WIDTH * height / width + _AROUND
         figure = Figure((COLUMN / 72, tall / 72), layout="constrained")
-        axes = figure.subplots(2, 2, width_ratios=(_MAP_SHARE, 1.0), sharey=True, squeeze=False)
+        axes = figure.subplots(2, 2, width_ratios=(_MAP_SHARE, 1.0), sharex="col", sharey=True)
         for row, (left, right) in enumerate(axes):
             picture = _draw_map(left, maps[row], titles[row])
-            _draw_counts(right, counted[row], curves[row], height)
+            _draw_counts(right, counted[row], curves[row], end)
             left.set_box_aspect(height / width)
             right.set_box_aspect(height / width * _MAP_SHARE)
         for column, label in enumerate(("column u, px", "disparity, px")):
-            axes[0, column].tick_params(labelbottom=False)
             axes[1, column].set_xlabel(label)
         figure.colorbar(
             picture, ax=axes[1, 0], location="bottom", label="disparity, px", aspect=30, extend="max"
@@ -158,9 +160,10 @@ def _draw_map(axes: Axes, disparity: NDArray[Any], title: str) -> Any:
     )
 
 
-def _draw_counts(axes: Axes, histogram: VDisparity, curve: Parabola | None, height: int) -> None:
-    counts, end = shown_counts(histogram, _COLUMNS)
-    edges = (0.0, end, height - 0.5, -0.5)
+def _draw_counts(axes: Axes, histogram: VDisparity, curve: Parabola | None, end: float) -> None:
+    height = len(histogram.counts)
+    counts, last = shown_counts(histogram, _COLUMNS, end)
+    edges = (0.0, last, height - 0.5, -0.5)
     axes.imshow(np.log1p(counts), cmap=_COLOURS, extent=edges, interpolation="none", aspect="auto")
     if curve is not None:
         rows = np.arange(height, dtype=float)

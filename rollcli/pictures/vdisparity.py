@@ -166,14 +166,21 @@ def draw_v_disparity(
     return _with_margins(chart, top, unit)
 
 
-def shown_counts(histogram: VDisparity, width: int) -> tuple[NDArray[np.float32], float]:
-    """Return the counts of the range that is shown, `width` columns wide, and its end, px."""
-    counts, end = histogram.counts, histogram.max_disparity
-    reached = np.cumsum(counts.sum(axis=0))
-    total = int(reached[-1])
-    last = int(np.searchsorted(reached, _SHOWN * total)) + 1 if total else counts.shape[1]
-    per_bin = end / counts.shape[1]
-    bins = min(counts.shape[1], math.ceil(math.ceil(last * per_bin / _ROUND_PX) * _ROUND_PX / per_bin))
+def shown_counts(
+    histogram: VDisparity, width: int, end: float | None = None
+) -> tuple[NDArray[np.float32], float]:
+    """Return the counts of the range that is shown, `width` columns wide, and its end, px.
+
+    It ends with the bin of `end`, px, or where hardly any pixels lie beyond.
+    """
+    counts = histogram.counts
+    per_bin = histogram.max_disparity / counts.shape[1]
+    if end is None:
+        reached = np.cumsum(counts.sum(axis=0))
+        total = int(reached[-1])
+        last = int(np.searchsorted(reached, _SHOWN * total)) + 1 if total else counts.shape[1]
+        end = math.ceil(last * per_bin / _ROUND_PX) * _ROUND_PX
+    bins = min(counts.shape[1], math.ceil(end / per_bin - 1e-9))
     kind = cv2.INTER_AREA if bins > width else cv2.INTER_NEAREST
     shown = cv2.resize(counts[:, :bins].astype(np.float32), (width, len(counts)), interpolation=kind)
     return shown.astype(np.float32, copy=False), bins * per_bin
