@@ -129,15 +129,15 @@ def v_disparity_figure(
     columns = MiddleColumn.of_map(theta, width), MiddleColumn.of_level(theta, width, height)
     curves = [None if alpha is None else column.profile(alpha) for column in columns]
     as_it_is = v_disparity(disparity, bins=bins, max_disparity=max_disparity)
-    # to the same end: both are read by the numbers below
+    # colours and counts to the same end: both rows are read by the numbers below
     counted = as_it_is, v_disparity(maps[1], bins=bins, max_disparity=as_it_is.max_disparity)
-    _, end = shown_counts(as_it_is, _COLUMNS)
+    (_, end), top = shown_counts(as_it_is, _COLUMNS), brightest(disparity)
     with drawing_style(PRINT):
         tall = 2 * _MAP_WIDTH * height / width + _AROUND
         figure = Figure((COLUMN / 72, tall / 72), layout="constrained")
         axes = figure.subplots(2, 2, width_ratios=(_MAP_SHARE, 1.0), sharex="col", sharey=True)
         for row, (left, right) in enumerate(axes):
-            picture = _draw_map(left, maps[row], titles[row])
+            picture = _draw_map(left, maps[row], top, titles[row])
             _draw_counts(right, counted[row], curves[row], end)
             left.set_box_aspect(height / width)
             right.set_box_aspect(height / width * _MAP_SHARE)
@@ -149,15 +149,13 @@ def v_disparity_figure(
         return figure_file(figure, kind, "Disparity map and v-disparity, as they are and de-rotated")
 
 
-def _draw_map(axes: Axes, disparity: NDArray[Any], title: str) -> Any:
+def _draw_map(axes: Axes, disparity: NDArray[Any], top: float, title: str) -> Any:
     known = np.isfinite(disparity) & (disparity > 0)
     shown = np.ma.masked_where(~known, disparity)
     axes.set_title(title, loc="left")
     axes.set_ylabel("row v, px")
     axes.grid(visible=False)
-    return axes.imshow(
-        shown, cmap=_COLOURS, vmin=0, vmax=brightest(disparity), interpolation="none", aspect="auto"
-    )
+    return axes.imshow(shown, cmap=_COLOURS, vmin=0, vmax=top, interpolation="none", aspect="auto")
 
 
 def _draw_counts(axes: Axes, histogram: VDisparity, curve: Parabola | None, end: float) -> None:
