@@ -12,6 +12,7 @@ import numpy as np
 
 from rollcli.files.containers import is_rest
 from rollcli.files.results import Row
+from rollcli.messages import counted
 from rollcli.pictures.overlay import round_step
 from rollcli.report.page import Chart
 from rollcli.report.summary import degrees, with_interval
@@ -277,7 +278,7 @@ def alignment(rows: Sequence[Row], rig: RigAssessment) -> Chart:
         "xaxis": axis.layout(),
         "yaxis": _axis("shift of rows, px", (-end, end), zeroline=True),
     }
-    return Chart("alignment", f"How the right view lies over {len(rows)} frames, px", data, layout)
+    return Chart("alignment", f"How the right view lies over {counted(len(rows), 'frame')}, px", data, layout)
 
 
 def _shifts_of_units(height: int, width: int) -> tuple[float, ...]:
@@ -361,7 +362,7 @@ def chart_over_frames(rows: Sequence[Row], quantity: Quantity, rig: RigAssessmen
         "yaxis2": {"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True},
     }
     what = (
-        f"{quantity.name.capitalize()} in {unit} over {len(rows)} frames; "
+        f"{quantity.name.capitalize()} in {unit} over {counted(len(rows), 'frame')}; "
         f"{len(suspect)} suspect and {len(failed)} failed are marked"
     )
     return Chart(quantity.name, what, data, layout)
@@ -378,9 +379,13 @@ def _stretches(places: Sequence[int], starts: Set[int]) -> list[Sequence[int]]:
 
 
 def histogram(rows: Sequence[Row]) -> Chart:
-    """Return how many frames have which roll, suspect ones on top of the others."""
+    """Return how many frames have which roll, suspect ones on top of the others.
+
+    Angles outside of `view` would squeeze the others into a bar: the axis says how many are left out.
+    """
     low, high = view(rows)
-    shown = [row.roll_deg for row in rows if row.roll_deg is not None and low <= row.roll_deg <= high]
+    known = [row.roll_deg for row in rows if row.roll_deg is not None]
+    shown = [roll for roll in known if low <= roll <= high]
     low, high = min(shown, default=low), max(shown, default=high)
     bins = min(_MOST_BINS, max(5, math.ceil(2 * math.sqrt(len(shown)))))  # fewer of fewer, higher than one
     step = round_step(max((high - low) / bins, _NARROWEST))
@@ -402,14 +407,16 @@ def histogram(rows: Sequence[Row]) -> Chart:
             "hovertemplate": "%{customdata}<br>%{y} frames<extra></extra>",
         }
         data += [bars] if rolls else []
-    width, highest = float(np.ptp(edges)), int(np.histogram(shown, edges)[0].max())
+    counts = np.histogram(known, edges)[0]
+    width, highest, left_out = float(np.ptp(edges)), int(counts.max()), len(known) - int(counts.sum())
     margin = max(0.02 * width, (_FEW_BINS * step - width) / 2)  # a single bar would fill the chart
     whole = {"dtick": 1} if highest <= _FEW_BINS else {}  # there are no half frames
     ends = float(edges[0]) - margin, float(edges[-1]) + margin
+    title = "roll, degrees" + (f" ({left_out} suspect left out)" if left_out else "")
     layout = {
         "barmode": "stack",
         "showlegend": [trace["name"] for trace in data] != ["ok"],
-        "xaxis": _axis("roll, degrees", ends, zeroline=False),
+        "xaxis": _axis(title, ends, zeroline=False),
         "yaxis": _axis("frames", (0, 1.05 * max(highest, 1)), **whole),
     }
     return Chart("histogram", "How many frames have which roll", data, layout)
