@@ -175,7 +175,7 @@ def draw_heights(
         NaN is no data.
     span : tuple of float
         The heights with the outermost colours, lowest first; what lies beyond has them, too. The colours of
-        either side of 0 are spread over that side.
+        either side of 0 are spread over that side; a range on one side of it has those of that side alone.
     unit : str
         Of heights and span, for the colour bar.
     photo : ndarray, shape (H', W') or (H', W', 3), optional
@@ -191,7 +191,8 @@ def draw_heights(
     places = np.linspace(1, 255, len(_BELOW_TO_ABOVE[0]))
     ramps = [np.interp(np.arange(256), places, ramp) for ramp in _BELOW_TO_ABOVE]
     colours = np.rint(np.column_stack(ramps)).astype(np.uint8)
-    levels = np.rint(np.interp(np.nan_to_num(heights), _knots(*span), (1.0, 128.0, 255.0))).astype(np.uint8)
+    knots, ends = _knots(*span)
+    levels = np.rint(np.interp(np.nan_to_num(heights), knots, ends)).astype(np.uint8)
     picture = cv2.applyColorMap(levels, colours.reshape(256, 1, 3))
     known = np.isfinite(heights)
     if photo is None:
@@ -203,22 +204,25 @@ def draw_heights(
         light = np.minimum(grey * np.float32((1 - _DARKEST) / white) + np.float32(_DARKEST), 1)
         picture = (picture * light[..., None]).astype(np.uint8)
         picture[~known] = cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)[~known]
-    return with_bar(picture.astype(np.uint8, copy=False), colours[:0:-1], _ticks(span, unit))
+    shown = colours[ends[0] : ends[-1] + 1][::-1]
+    return with_bar(picture.astype(np.uint8, copy=False), shown, _ticks(span, unit))
 
 
-def _knots(low: float, high: float) -> tuple[float, float, float]:
-    """Return the heights of the first, the middle and the last colour; the road has the middle one."""
-    return low, 0.0 if low < 0 < high else (low + high) / 2, high
+def _knots(low: float, high: float) -> tuple[tuple[float, ...], tuple[int, ...]]:
+    """Return heights between which colours are evenly spread, and their levels; the road's is 128."""
+    if low < 0 < high:
+        return (low, 0.0, high), (1, 128, 255)
+    return (low, high), ((1, 128) if low < 0 else (128, 255))
 
 
 def _ticks(span: tuple[float, float], unit: str) -> list[tuple[float, str]]:
     """Return places on the bar, 0 at its bottom and 1 at its top, and what is written there."""
-    knots = _knots(*span)
+    knots, _ = _knots(*span)
     step = round_step((span[1] - span[0]) / _LABELS)
     inner = [round(number * step, 9) for number in range(int(span[0] / step), int(span[1] / step) + 1)]
     values = [value for value in inner if span[0] + step / 2 < value < span[1] - step / 2]
     zero = "0 m" if unit == METRES else "0 H"
     return [
-        (float(np.interp(value, knots, (0.0, 0.5, 1.0))), f"{value:+.4g}" if value else zero)
+        (float(np.interp(value, knots, np.linspace(0, 1, len(knots)))), f"{value:+.4g}" if value else zero)
         for value in (span[0], *values, span[1])
     ]
