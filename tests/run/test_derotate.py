@@ -98,6 +98,7 @@ def test_copies_of_maps_are_known_by_the_calibration_that_the_maps_had(tmp_path)
         write_kitti(tmp_path / folder / name, np.where(down > 0.2, disparity, 0))
     camera = ("--focal", "200", "--principal-point", "99.5,0.1", "--baseline", "0.5")
     rollcli("estimate", "maps", *camera, "-o", "rolls.csv", cwd=tmp_path, status=0)
-    rows = (tmp_path / "rolls.csv").read_text()  # a suspect angle does not tell maps apart
+    # a suspect angle does not tell maps apart
+    rows = (tmp_path / "rolls.csv").read_text().replace("two.png,,ok,-", "two.png,,ok,")
     (tmp_path / "rolls.csv").write_text(rows.replace("two.png,,ok,", "two.png,,suspect,1"))
     assert rollcli("derotate", "copies", "--from", "rolls.csv", "-o", "out", cwd=tmp_path, status=0).err
