@@ -204,9 +204,10 @@ class Grid:
     scale: float
 
     @classmethod
-    def of_shape(cls, height: int, width: int, middle: float | None = None) -> "Grid":
-        """Return the grid of a map of this shape; `middle`: the column of its origin, if not the centre."""
-        return cls((width - 1) / 2 if middle is None else middle, (height - 1) / 2, max(width, height, 2) / 2)
+    def of_shape(cls, height: int, width: int, middle: tuple[float, float] | None = None) -> "Grid":
+        """Return the grid of a map of this shape; its origin is in the column of `middle`, if given."""
+        column = (width - 1) / 2 if middle is None else middle[0]
+        return cls(column, (height - 1) / 2, max(width, height, 2) / 2)
 
     def normalised(self, u: NDArray[Any], v: NDArray[Any]) -> tuple[Floats, Floats]:
         """Return p of columns and q of rows, each an array of the shape given."""

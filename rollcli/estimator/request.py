@@ -75,8 +75,8 @@ class Request:
         road's: what is left of it where the views of a pair were levelled (`StereoMatch.slope_error`).
     seed : int
         Of road finding.
-    middle : float or None
-        Column that looks straight ahead, px: the principal point's, which a crop moves away from the
+    middle : tuple of float, or None
+        Column and row that look straight ahead, px: the principal point, which a crop moves away from the
         middle of the map. None: that middle.
     doffs : float
         What is added to disparities so that they are 0 infinitely far away, px: that of a calibration.
@@ -98,7 +98,7 @@ class Request:
     max_interval: float = math.radians(MAX_INTERVAL_DEG)
     slope_error: float = 0.0
     seed: int = 0
-    middle: float | None = None
+    middle: tuple[float, float] | None = None
     doffs: float = 0.0
     tuning: Tuning = TUNING
 

@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 from rollcli.errors import UsageError
 from rollcli.estimator.estimate import RollEstimate
 from rollcli.estimator.moments import Bools, Floats, Singles, from_infinity, has_disparity, map_of, strips
-from rollcli.estimator.road.model import FARTHEST_SIDE, Coordinate, RoadModel
+from rollcli.estimator.road.model import FARTHEST_SIDE, Coordinate, RoadModel, column_ahead
 from rollcli.estimator.road.sample import medians_of
 from rollcli.files.results import Row
 from rollcli.rig.calibration import Calibration, require_calibration
@@ -64,7 +64,7 @@ class FittedRoad:
     width, height : int
         Of the map, px.
     ahead : float or None
-        Column that looks straight ahead, where camber is level, px; None: the map's middle.
+        Column of the middle row that looks straight ahead, where camber is level, px; None: the middle.
     """
 
     model: RoadModel
@@ -96,7 +96,8 @@ class FittedRoad:
         if calibration is not None and row.pitch_deg is not None:
             if row.image_roll_deg is None:
                 theta = math.atan2(math.sin(theta) * calibration.fy / calibration.fx, math.cos(theta))
-            ahead, nearer = calibration.cx, nearer * turns_of(theta, calibration)
+            ahead = column_ahead(theta, (calibration.cx, calibration.cy), (row.height - 1) / 2)
+            nearer = nearer * turns_of(theta, calibration)
         return cls(RoadModel(theta, row.alpha, (row.camber or 0.0) / nearer**2), row.width, row.height, ahead)
 
     @property

@@ -117,7 +117,7 @@ def estimate_roll(
         raise UsageError(f"an array of shape {values.shape} is no disparity map: {remedy}")
     if rig is not None and values.ndim == 2:
         own = rig.for_size(*values.shape[::-1])
-        request = replace(request, middle=own.cx, doffs=own.doffs)
+        request = replace(request, middle=(own.cx, own.cy), doffs=own.doffs)
 
     def like() -> str:
         if values.dtype.kind not in "fiu" or not values.size:
@@ -202,7 +202,7 @@ def estimate_pair(
         raise UsageError("the mask leaves no pixel of the map: give an array that is not all zero")
     source = matched_source((left, right), stereo or StereoOptions(), road_finder(allowed, request), rig)
     rig = source.calibrated(rig)
-    seen: dict[str, Any] = {} if rig is None else {"middle": rig.cx, "doffs": rig.doffs}
+    seen: dict[str, Any] = {} if rig is None else {"middle": (rig.cx, rig.cy), "doffs": rig.doffs}
     request = replace(request, slope_error=source.slope_error, **seen)
     with source.doubting():
         estimate = estimator.estimate_roll(source.disparity, request, mask=allowed, road_mask=road_mask)

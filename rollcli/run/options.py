@@ -224,8 +224,9 @@ class MethodOptions(NamedTuple):
             name.removesuffix("_deg"): math.radians(value) if name.endswith("_deg") else value
             for name, value in self._asdict().items()
         }
-        middle, doffs = (None, 0.0) if calibration is None else (calibration.cx, calibration.doffs)
-        return Request(**given, slope_error=slope_error, middle=middle, doffs=doffs)
+        if calibration is not None:
+            given |= {"middle": (calibration.cx, calibration.cy), "doffs": calibration.doffs}
+        return Request(**given, slope_error=slope_error)
 
 
 class ImageOptions(NamedTuple):

@@ -9,7 +9,7 @@ from rollcli.simulate.dataset import Dataset, write_dataset
 from rollcli.simulate.spec import FrameSpec
 from tests.run_cli import contents, road_map, rollcli, rows_of, write_kitti
 
-RIG = ("--focal", "300", "--principal-point", "79.5,20", "--baseline", "0.5")
+RIG = ("--focal", "300", "--principal-point", "79.5,59.5", "--baseline", "0.5")
 
 
 @pytest.fixture(scope="module")

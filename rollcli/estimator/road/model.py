@@ -15,6 +15,7 @@ Coordinate = TypeVar("Coordinate", float, Reals)
 Parabola = tuple[float, float, float]
 """(a0, a1, a2) of d = a0 + a1 y + a2 y^2."""
 
+_STEEPEST = 2.0  # columns a row: a rig that lies on its side sees the lane along the rows
 _HARDLY = 1e-9  # of the slope: a disparity that is none, by which squares can be divided
 FARTHEST_SIDE = 4.0  # camera heights to the side; camber is not extrapolated beyond
 
@@ -120,3 +121,11 @@ class RoadModel(NamedTuple):
     def _positive(self, disparity: Reals) -> Reals:
         """Return disparities, px, that one can divide by."""
         return np.asarray(np.maximum(disparity, _HARDLY * abs(self.alpha[1]) + 1e-30))
+
+
+def column_ahead(theta: float, middle: tuple[float, float], row: float) -> float:
+    """Return the column of a row where the lane ahead is, px, on a rig that is rolled by theta.
+
+    The lane runs through the principal point `middle`, its column and row, at right angles to the horizon.
+    """
+    return middle[0] + (middle[1] - row) * min(max(math.tan(theta), -_STEEPEST), _STEEPEST)

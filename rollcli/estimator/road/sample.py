@@ -119,7 +119,7 @@ def take_sample(
     disparity: NDArray[Any],
     usable: Bools | None,
     tuning: SampleTuning,
-    middle: float | None = None,
+    middle: tuple[float, float] | None = None,
 ) -> Sample:
     """Sample a map.
 
@@ -130,7 +130,7 @@ def take_sample(
     usable : ndarray of bool, shape (H, W), or None
         Pixels that may be taken; neighbours outside still count as neighbours.
     tuning : SampleTuning
-    middle : float, optional
+    middle : tuple of float, optional
         See `Request`.
 
     Returns

@@ -20,7 +20,7 @@ from rollcli.estimator.energy import Energy
 from rollcli.estimator.moments import Bools, Floats, Grid, Singles, powers, solve_normal, strips
 from rollcli.estimator.request import Request
 from rollcli.estimator.road.find import HARDLY_A_PIXEL, Road, agreement
-from rollcli.estimator.road.model import Reals, RoadModel
+from rollcli.estimator.road.model import Reals, RoadModel, column_ahead
 from rollcli.estimator.road.sample import Sample, count, medians_of, quantile, reach_of, steps_to, tolerances
 from rollcli.estimator.tuning import FitTuning, Tuning
 
@@ -158,6 +158,7 @@ def fit_surface(sample: Sample, road: Road, request: Request) -> Surface:
     EstimationError
         When hardly any pixel lies on the road.
     """
+    sample, road = _straight_ahead(sample, road, request)
     near = _near_pixels(sample, road, request)
     lane = near.lane(road.model)
     level, near = near.profiled(lane)
@@ -335,6 +336,17 @@ class NearPixels:
         weights = weights * self.ahead
         total = max(float(weights.sum()), 1e-30)
         return max(self.least_width, self.tuning.width * math.sqrt(float(weights.dot(squares)) / total))
+
+
+def _straight_ahead(sample: Sample, road: Road, request: Request) -> tuple[Sample, Road]:
+    """Move the origin to the column of its row where the rolled lane below the principal point is."""
+    before, middle = sample.grid, request.middle
+    if middle is None:
+        return sample, road
+    grid = replace(before, centre_u=column_ahead(road.model.theta, middle, before.centre_v))
+    right = (grid.centre_u - before.centre_u) / grid.scale
+    plane = road.plane + np.array([right * road.plane[1], 0, 0])
+    return replace(sample, grid=grid, x=sample.x - np.float32(right)), replace(road, plane=plane)
 
 
 def _near_pixels(sample: Sample, road: Road, request: Request) -> NearPixels:

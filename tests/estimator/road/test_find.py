@@ -321,7 +321,7 @@ def test_a_road_without_road_finding_is_beyond_doubt(model):
 
 @pytest.mark.parametrize("cropped", [0, 100, 200, 250])
 def test_the_lane_ahead_is_the_one_below_the_given_column(cropped):
-    estimate = estimate_roll(banked_road(2, cropped=cropped), Request(middle=310.0 - cropped))
+    estimate = estimate_roll(banked_road(2, cropped=cropped), Request(middle=(310.0 - cropped, 94.0)))
 
     assert estimate.status == "ok"
     assert abs(estimate.roll_deg - 2) < 0.02

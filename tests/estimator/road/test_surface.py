@@ -81,14 +81,13 @@ def test_on_a_crowned_road_the_angle_is_that_under_the_rig(fall, left_edge):
 
 @pytest.mark.parametrize("fall", [0.02, 0.04])
 @pytest.mark.parametrize("sign", [-1, 1])
-def test_camber_is_reported_in_camera_heights(fall, sign):
+@pytest.mark.parametrize(("roll_deg", "cropped"), [(2, 0), (8, 160)])
+def test_camber_is_reported_in_camera_heights(fall, sign, roll_deg, cropped):
     curvature = sign * fall / 3.5
-    disparity = disparity_of(lambda x: curvature / 2 * np.square(x), roll_deg=2)
-
-    estimate = estimate_roll(disparity)
-
+    disparity = disparity_of(lambda x: curvature / 2 * np.square(x), roll_deg)[cropped:]
+    estimate = estimate_roll(disparity, Request(middle=((WIDTH - 1) / 2, (HEIGHT - 1) / 2 - cropped)))
     assert estimate.camber == pytest.approx(curvature * CAMERA_HEIGHT, rel=0.15)
-    assert math.degrees(estimate.theta) == pytest.approx(2, abs=0.02)
+    assert math.degrees(estimate.theta) == pytest.approx(roll_deg, abs=0.02)
 
 
 def test_where_only_the_middle_is_seen_camber_is_left_open():
