@@ -150,8 +150,7 @@ def v_disparity_figure(
 
 
 def _draw_map(axes: Axes, disparity: NDArray[Any], top: float, title: str) -> Any:
-    known = np.isfinite(disparity) & (disparity > 0)
-    shown = np.ma.masked_where(~known, disparity)
+    shown = np.ma.masked_where(~(np.isfinite(disparity) & (disparity > 0)), disparity)
     axes.set_title(title, loc="left")
     axes.set_ylabel("row v, px")
     axes.grid(visible=False)

@@ -166,16 +166,14 @@ def draw_v_disparity(
     return _with_margins(chart, top, unit)
 
 
-def shown_counts(
-    histogram: VDisparity, width: int, end: float | None = None
-) -> tuple[NDArray[np.float32], float]:
+def shown_counts(histogram: VDisparity, width: int, end: float = 0) -> tuple[NDArray[np.float32], float]:
     """Return the counts of the range that is shown, `width` columns wide, and its end, px.
 
-    It ends with the bin of `end`, px, or where hardly any pixels lie beyond.
+    It ends with the bin of `end`, px; 0: where hardly any pixels lie beyond.
     """
     counts = histogram.counts
     per_bin = histogram.max_disparity / counts.shape[1]
-    if end is None:
+    if not end:
         reached = np.cumsum(counts.sum(axis=0))
         total = int(reached[-1])
         last = int(np.searchsorted(reached, _SHOWN * total)) + 1 if total else counts.shape[1]

@@ -158,7 +158,11 @@ def fit_surface(sample: Sample, road: Road, request: Request) -> Surface:
     EstimationError
         When hardly any pixel lies on the road.
     """
-    sample, road = _straight_ahead(sample, road, request)
+    if request.middle is not None:  # the origin moves to where the rolled lane crosses its row
+        column = column_ahead(road.model.theta, request.middle, sample.grid.centre_v)
+        right = (column - sample.grid.centre_u) / sample.grid.scale
+        road = replace(road, plane=road.plane + np.array([right * road.plane[1], 0, 0]))
+        sample = replace(sample, grid=replace(sample.grid, centre_u=column), x=sample.x - np.float32(right))
     near = _near_pixels(sample, road, request)
     lane = near.lane(road.model)
     level, near = near.profiled(lane)
@@ -336,17 +340,6 @@ class NearPixels:
         weights = weights * self.ahead
         total = max(float(weights.sum()), 1e-30)
         return max(self.least_width, self.tuning.width * math.sqrt(float(weights.dot(squares)) / total))
-
-
-def _straight_ahead(sample: Sample, road: Road, request: Request) -> tuple[Sample, Road]:
-    """Move the origin to the column of its row where the rolled lane below the principal point is."""
-    before, middle = sample.grid, request.middle
-    if middle is None:
-        return sample, road
-    grid = replace(before, centre_u=column_ahead(road.model.theta, middle, before.centre_v))
-    right = (grid.centre_u - before.centre_u) / grid.scale
-    plane = road.plane + np.array([right * road.plane[1], 0, 0])
-    return replace(sample, grid=grid, x=sample.x - np.float32(right)), replace(road, plane=plane)
 
 
 def _near_pixels(sample: Sample, road: Road, request: Request) -> NearPixels:
