@@ -31,7 +31,7 @@ PROGRAM, TESTS = "rollcli", "tests"
 # the tests of a package beyond the folder of its name, the quickest first
 FURTHER = {
     "cli": "run/test_recorded run/test_resume test_messages test_readme",
-    "estimator": "rig/test_pose",
+    "estimator": "rig/test_pose rig/test_recorded",
     "evaluate": (
         "cli/test_recorded cli/test_mistakes cli/test_evaluate_paper cli/test_outputs cli/test_heights "
         "estimator/test_energy estimator/solvers test_package"
