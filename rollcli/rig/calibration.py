@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from rollcli.errors import UsageError
+from rollcli.estimator.request import Request
 
 
 class CalibrationOptions(NamedTuple):
@@ -202,6 +203,13 @@ def for_matched(calibration: Calibration, width: int, height: int, downscale: fl
     if calibration.width is None:  # its numbers are for the images as they are
         calibration = calibration.for_size(round(width * downscale), round(height * downscale))
     return calibration.for_size(width, height)
+
+
+def request_with(calibration: Calibration | None, request: Request) -> Request:
+    """Return a request for a map that this is the calibration of; as it is where there is none."""
+    if calibration is None:
+        return request
+    return replace(request, middle=(calibration.cx, calibration.cy), doffs=calibration.doffs)
 
 
 def require_calibration(calibration: object) -> None:

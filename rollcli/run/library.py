@@ -19,7 +19,7 @@ from rollcli.files.containers import bag_files, is_video
 from rollcli.files.encodings import Encoding, to_disparity
 from rollcli.files.formats import Stored, read_image, read_stored
 from rollcli.files.naming import Input
-from rollcli.rig.calibration import Calibration
+from rollcli.rig.calibration import Calibration, request_with
 from rollcli.rig.pose import with_pose
 from rollcli.run.diagnosis import REMEDIES, estimate_or_liken, looks_like, too_large
 from rollcli.run.find import given_calibration
@@ -116,8 +116,7 @@ def estimate_roll(
         remedy = REMEDIES["photograph"][True]
         raise UsageError(f"an array of shape {values.shape} is no disparity map: {remedy}")
     if rig is not None and values.ndim == 2:
-        own = rig.for_size(*values.shape[::-1])
-        request = replace(request, middle=(own.cx, own.cy), doffs=own.doffs)
+        request = request_with(rig.for_size(*values.shape[::-1]), request)
 
     def like() -> str:
         if values.dtype.kind not in "fiu" or not values.size:
@@ -202,8 +201,7 @@ def estimate_pair(
         raise UsageError("the mask leaves no pixel of the map: give an array that is not all zero")
     source = matched_source((left, right), stereo or StereoOptions(), road_finder(allowed, request), rig)
     rig = source.calibrated(rig)
-    seen: dict[str, Any] = {} if rig is None else {"middle": (rig.cx, rig.cy), "doffs": rig.doffs}
-    request = replace(request, slope_error=source.slope_error, **seen)
+    request = request_with(rig, replace(request, slope_error=source.slope_error))
     with source.doubting():
         estimate = estimator.estimate_roll(source.disparity, request, mask=allowed, road_mask=road_mask)
     estimate = source.doubted(estimate)

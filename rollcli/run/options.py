@@ -18,7 +18,7 @@ from rollcli.estimator.request import (
     Request,
 )
 from rollcli.messages import say
-from rollcli.rig.calibration import Calibration, CalibrationOptions
+from rollcli.rig.calibration import Calibration, CalibrationOptions, request_with
 from rollcli.stereo.options import StereoOptions
 
 Save = Literal["png", "tiff", "npy"]
@@ -224,9 +224,7 @@ class MethodOptions(NamedTuple):
             name.removesuffix("_deg"): math.radians(value) if name.endswith("_deg") else value
             for name, value in self._asdict().items()
         }
-        if calibration is not None:
-            given |= {"middle": (calibration.cx, calibration.cy), "doffs": calibration.doffs}
-        return Request(**given, slope_error=slope_error)
+        return request_with(calibration, Request(**given, slope_error=slope_error))
 
 
 class ImageOptions(NamedTuple):
