@@ -22,7 +22,7 @@ from rollcli.estimator.road.model import Parabola
 from rollcli.pictures.colours import LIGHT
 from rollcli.pictures.derotate import derotate
 from rollcli.pictures.overlay import brightest
-from rollcli.pictures.vdisparity import MiddleColumn, VDisparity, shown_counts, v_disparity
+from rollcli.pictures.vdisparity import MiddleColumn, VDisparity, shown_counts, shown_end, v_disparity
 
 _SETTINGS = threading.Lock()  # matplotlib has one set of them for all threads
 COLUMN = 3.5 * 72  # pt: the width of a column in journals of two columns
@@ -131,7 +131,7 @@ def v_disparity_figure(
     as_it_is = v_disparity(disparity, bins=bins, max_disparity=max_disparity)
     # colours and counts to the same end: both rows are read by the numbers below
     counted = as_it_is, v_disparity(maps[1], bins=bins, max_disparity=as_it_is.max_disparity)
-    (_, end), top = shown_counts(as_it_is, _COLUMNS), brightest(disparity)
+    end, top = shown_end(as_it_is), brightest(disparity)
     with drawing_style(PRINT):
         tall = 2 * _MAP_WIDTH * height / width + _AROUND
         figure = Figure((COLUMN / 72, tall / 72), layout="constrained")
@@ -165,7 +165,7 @@ def _draw_counts(axes: Axes, histogram: VDisparity, curve: Parabola | None, end:
     if curve is not None:
         rows = np.arange(height, dtype=float)
         axes.plot(np.polynomial.Polynomial(curve)(rows), rows, color=_ROAD, linewidth=0.8, linestyle="--")
-    axes.set_xlim(0, end)
+    axes.set_xlim(0, last)
     axes.set_ylim(height - 0.5, -0.5)
     axes.grid(visible=False)
     for axis in (axes.xaxis, axes.yaxis):

@@ -154,7 +154,7 @@ def draw_v_disparity(
         Width, margins and letters are twice as large for 960 rows, three times for 1440, and so on.
     """
     unit = max(1, len(histogram.counts) // _UNIT_ROWS)
-    counts, top = shown_counts(histogram, _WIDTH * unit)
+    counts, top = shown_counts(histogram, _WIDTH * unit, shown_end(histogram))
     light = np.log1p(counts)
     brightest = float(np.percentile(light[counts > 0], 99.9)) if counts.any() else 1.0
     grey = np.minimum(light * (255 / brightest), 255).astype(np.uint8)
@@ -166,19 +166,21 @@ def draw_v_disparity(
     return _with_margins(chart, top, unit)
 
 
-def shown_counts(histogram: VDisparity, width: int, end: float = 0) -> tuple[NDArray[np.float32], float]:
-    """Return the counts of the range that is shown, `width` columns wide, and its end, px.
+def shown_end(histogram: VDisparity) -> float:
+    """Return the disparity beyond which hardly any pixels lie, px, rounded up."""
+    counts = histogram.counts
+    reached = np.cumsum(counts.sum(axis=0))
+    total = int(reached[-1])
+    last = int(np.searchsorted(reached, _SHOWN * total)) + 1 if total else counts.shape[1]
+    per_bin = histogram.max_disparity / counts.shape[1]
+    return float(math.ceil(last * per_bin / _ROUND_PX) * _ROUND_PX)
 
-    It ends with the bin of `end`, px; 0: where hardly any pixels lie beyond.
-    """
+
+def shown_counts(histogram: VDisparity, width: int, end: float) -> tuple[NDArray[np.float32], float]:
+    """Return the counts up to the bin of `end`, px, `width` columns wide, and where that bin ends, px."""
     counts = histogram.counts
     per_bin = histogram.max_disparity / counts.shape[1]
-    if not end:
-        reached = np.cumsum(counts.sum(axis=0))
-        total = int(reached[-1])
-        last = int(np.searchsorted(reached, _SHOWN * total)) + 1 if total else counts.shape[1]
-        end = math.ceil(last * per_bin / _ROUND_PX) * _ROUND_PX
-    bins = min(counts.shape[1], math.ceil(end / per_bin - 1e-9))
+    bins = min(counts.shape[1], math.ceil(end / per_bin))
     kind = cv2.INTER_AREA if bins > width else cv2.INTER_NEAREST
     shown = cv2.resize(counts[:, :bins].astype(np.float32), (width, len(counts)), interpolation=kind)
     return shown.astype(np.float32, copy=False), bins * per_bin

@@ -24,6 +24,7 @@ from rollcli.pictures.vdisparity import (
     VDisparity,
     draw_v_disparity,
     shown_counts,
+    shown_end,
     v_disparity,
 )
 from rollcli.rig.calibration import Calibration
@@ -101,7 +102,8 @@ def _roads():
 
 def _counted(given, **options):
     found = v_disparity(given, **options)
-    return {"counts": found.counts, "end": found.max_disparity, "shown": shown_counts(found, 50)}
+    shown = shown_counts(found, 50, shown_end(found))
+    return {"counts": found.counts, "end": found.max_disparity, "shown": shown}
 
 
 def _histogram(height=120, bins=96, top=96.0, beyond=0):
