@@ -271,23 +271,26 @@ def match_pair(
     most = count if options.num_disparities else usable_range(2 * count, first, width, options.block_size)
 
     blank, find_road = shows_nothing(views[0]), find_road if first >= 0 else None
-    tried: list[Levelled] = []
+    tried: list[tuple[Levelled, float]] = []  # with the share of its map at the range's end
 
     def match(lies: Misalignment) -> Map:
-        before, searched = (tried[-1], tried[-1].count) if tried else (None, count)
+        before = tried[-1][0] if tried else None
+        searched = count if before is None else before.count
         pair = Levelled(views, lies, look.disparity, first, searched, options, find_road, blank, before)
         disparity = pair.matched()
-        if pair.count < most and _share_at_end(disparity, pair) > MUCH_AT_END:
+        at_end = _share_at_end(disparity, pair)
+        if pair.count < most and at_end > MUCH_AT_END:
             pair = replace(pair, count=most, before=None)
             disparity = pair.matched()
-        tried.append(pair)
+            at_end = _share_at_end(disparity, pair)
+        tried.append((pair, at_end))
         return disparity
 
     if options.measures_alignment:
         found = _match_levelled(match, small, look, first < 0)
     else:
         found = _match_as_told(match, small, told, check=options.checks_alignment)
-    pair, corrected = tried[-1], found.corrected
+    (pair, end_fraction), corrected = tried[-1], found.corrected
     support = found.support(_axis(rig, given[0].shape, options.downscale), height)
     lies = found.left_to_refine(small.shape)
 
@@ -299,7 +302,7 @@ def match_pair(
         disparity=disparity,
         min_disparity=first,
         num_disparities=pair.count,
-        end_fraction=_share_at_end(found.disparity, pair),
+        end_fraction=end_fraction,
         corrected=corrected,
         larger=support.scale,
         measured=found.measured,
