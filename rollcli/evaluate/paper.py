@@ -52,10 +52,11 @@ def run_paper(options: PaperOptions) -> ExitStatus:
         raise UsageError("--encoding depth: the experiments are made on disparity maps, not on depth maps")
     frames, folder = find_frames(options), options.output
     check_places(frames, options.folders)
-    truth = {} if options.truth is None else read_truth(options.truth)
-    unknown = [frame.file for frame in frames if stem_of(frame.file) not in truth]
-    if unknown and options.truth is not None:
-        raise UsageError(f"{unknown[0]}: has no known angle in {options.truth}")
+    truth = dict[str, KnownPose]()
+    if options.truth is not None:
+        truth = read_truth(options.truth)
+        if unknown := [frame.file for frame in frames if stem_of(frame.file) not in truth]:
+            raise UsageError(f"{unknown[0]}: has no known angle in {options.truth}")
     kind = options.figure
     names = [f"{name}.{kind}" for name in FIGURES] if kind is not None else []
     writes = [within(folder, name) for name in (*(f"{name}.csv" for name in TABLES), *names, PAGE)]
