@@ -168,7 +168,9 @@ class Judge:
         self._slope_noise = sample.noise * sample.grid.scale / sample.reach  # px per unit
         self._rows = np.stack([np.ones_like(d), x, y, d]) / tolerance
         self._near = np.minimum(d, quantile(d, 0.5))  # what is near ahead is the road driven on
-        self._products = (self._rows[:3, None] * self._rows[None]).reshape(12, -1) * self._near
+        products = (self._rows[:3, None] * self._rows[None]).reshape(12, -1) * self._near
+        # sums of single precision moved planes by a 50,000th, and real pairs by 0.006 degrees, with the BLAS
+        self._products = products.astype(np.float64)
         self._bearings = np.stack([-y / d, x / d])
         self._slopes = np.stack([-across, -along, np.ones_like(d), across**2 + along**2])
         # below a plane a coherent pixel costs twice as much as one that is merely off it
@@ -198,7 +200,7 @@ class Judge:
             off *= off
             weight = np.maximum(1 - off, 0, out=off)
             weight *= place
-            sums = weight.dot(self._products.T).reshape(-1, 3, 4).astype(np.float64)
+            sums = weight.dot(self._products.T).reshape(-1, 3, 4)
             planes = solve_normal(sums[..., :3], sums[..., 3]).astype(np.float32)
         return planes
 
