@@ -287,8 +287,7 @@ def _checks(rigs: Sequence[RigAssessment], gates: GateOptions, change: Estimate 
             jumps.append(_limited("change against the other result", change, gates.max_jump))
         yield _worst("max-jump", jumps)
     if gates.max_misalignment is not None:
-        shifts = over_drives(_shifts, gates.max_misalignment)
-        yield _worst("max-misalignment", shifts or [(None, "how the views lie: no pair was measured")])
+        yield _worst("max-misalignment", over_drives(_shifts, gates.max_misalignment))
     if gates.min_ok is not None:
         yield _worst("min-ok", [_share(rig, gates.min_ok) for rig in rigs])
 
@@ -370,9 +369,10 @@ def _limited(what: str, found: Estimate, limit: float, why: str = "too few frame
 
 
 def _shifts(rig: RigAssessment, drive: DriveAssessment, limit: float) -> Iterator[_Told]:
-    """Tell of the pairs since the last jump, and where they drift of each end; of nothing without pairs."""
+    """Tell of the pairs since the last jump, and where they drift of each end."""
     measured = _measured(rig, drive)
     if measured is None:
+        yield None, f"how the views of {_frames(rig, drive)} lie: no pair was measured"
         return
     quantities, size = measured
     for frames, parts in _ends(rig, drive, quantities):

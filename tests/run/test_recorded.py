@@ -114,6 +114,10 @@ GATES = {
         for first, last in ((2.0, 0.0), (0.5, 0.5), (0.0, 1.0), (0.0, 0.875))
     },
     "pairs off in one drive": (partial(rig, _pairs(2.0, 2.0), _pairs(0.0, 0.0)), {"max_misalignment": 1.0}),
+    "no pair measured in one drive": (
+        lambda: rig(_pairs(0.0, 0.0), ("b", {"roll": sequence(9)})),
+        {"max_misalignment": 1.0},
+    ),
 }
 WRONG = (
     *({"expect_roll": 0.0}, {"expect_pitch": 0.0}, {"expect_pitch": 0.0, "within_height": 1.0}),
