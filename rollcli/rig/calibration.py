@@ -18,8 +18,8 @@ class CalibrationOptions(NamedTuple):
         A file, or a folder with one of the same stem each: KITTI, Middlebury, ETH3D, OpenCV, ROS (twice:
         left, right), Cityscapes, ORB-SLAM, DrivingStereo; recognised by content.
     focal : float or None
-        Focal length, pixels of images of the size that --calib states, else of those given. [default: the
-        file's]
+        Focal length fx, pixels of images of the size that --calib states, else of those given; fy / fx is
+        the file's, else 1. [default: the file's]
     principal_point : tuple of float or None
         Optical axis in the left view, pixels as of --focal, from the centre of the top-left one. [default:
         the file's]

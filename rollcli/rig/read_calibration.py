@@ -105,7 +105,9 @@ def _read(files: Sequence[File]) -> Fields:
 
 def _overridden(known: Known, given: CalibrationOptions) -> Known:
     cx, cy = given.principal_point or (None, None)
-    numbers: dict[str, Any] = {"fx": given.focal, "fy": given.focal, "cx": cx, "cy": cy, "doffs": given.doffs}
+    numbers: dict[str, Any] = {"fx": given.focal, "cx": cx, "cy": cy, "doffs": given.doffs}
+    if given.focal is not None:  # pixels are as high as the file says, if it does
+        numbers["fy"] = given.focal * (known.fy / known.fx if known.fx and known.fy else 1.0)
     if given.baseline is not None:  # what the file's notes say is about its own one
         numbers |= {"baseline": given.baseline, "notes": ()}
     return replace(known, **{name: value for name, value in numbers.items() if value is not None})

@@ -157,3 +157,8 @@ def test_a_baseline_that_a_file_lacks_is_added_to_what_it_says():
     text = samples.written("middlebury", OFFSET)
     found = parse(text.replace("baseline=", "was="), baseline=OFFSET.baseline)
     assert replace(found, source="calib0") == parse(text)
+
+
+def test_a_focal_length_beside_a_file_leaves_the_shape_of_its_pixels():
+    half = parse(samples.written("kitti-benchmark", SKEWED), focal=SKEWED.fx / 2)
+    assert (half.fx, half.fy) == pytest.approx((SKEWED.fx / 2, SKEWED.fy / 2), rel=1e-12)
