@@ -276,7 +276,7 @@ def correction_text(health: Health | None, rows: DriveRows | None, results: Sequ
         **({} if rows is None else rows.as_text(height, width)),
         "matrix": lies.matrix(height, width, larger, axis),
         "opencv": _CALL,
-        "note": "matrix: from a pixel of the corrected right view to the given one, without twist and bend, "
-        f"which no matrix holds, about {about}; {NOT_SEEN}",
+        "note": f"matrix, for views of {width}x{height} px: from a pixel of the corrected right view to "
+        f"the given one, without twist and bend, which no matrix holds, about {about}; {NOT_SEEN}",
     }
     return json.dumps(values, indent=2) + "\n"
