@@ -136,6 +136,8 @@ class StereoMatch:
         where the views were level enough to be left as they are; 0 if nothing was measured.
     doubt : str
         Why the views may not be level now; empty if there is no reason.
+    as_told : bool
+        Whether it was levelled by what a user said, not by what was measured.
     match_whole : callable
         Makes `whole`.
     """
@@ -150,6 +152,7 @@ class StereoMatch:
     lacks_road: bool
     slope_error: float
     doubt: str
+    as_told: bool
     match_whole: Callable[[], Map]
 
     @cached_property
@@ -159,13 +162,13 @@ class StereoMatch:
 
     @property
     def lies(self) -> Misalignment | None:
-        """How the right view lies: as corrected, or as measured where that was too little to correct.
+        """How the right view lies: as corrected, or as measured where that did not correct it.
 
         None where nothing was measured, or what was measured could not be corrected.
         """
         if self.measured is None or self.doubt in (TOO_LITTLE, NOT_LEVELLED):
             return None
-        as_measured = self.corrected == LEVEL or self.doubt == CONTRADICTS
+        as_measured = self.as_told or self.corrected == LEVEL
         return self.measured.misalignment if as_measured else self.corrected
 
 
@@ -309,6 +312,7 @@ def match_pair(
         lacks_road=pair.lacks_road,
         slope_error=support.error,
         doubt=found.doubt or _doubt_of_columns(support),
+        as_told=not options.measures_alignment,
         match_whole=lambda: disparity if find_road is None else finished(pair.matched(whole=True)),
     )
 

@@ -168,6 +168,17 @@ def test_a_pair_that_contradicts_the_correction_is_suspect(pairs):
     assert all("do not lie as the correction says" in row["message"] for row in rows)
 
 
+def test_a_drive_says_how_its_pairs_lie_and_not_what_an_earlier_correction_says(pairs):
+    earlier = json.loads((pairs / "use.json").read_text())
+    earlier["right_clockwise_deg"] -= 0.05
+    (pairs / "earlier.json").write_text(json.dumps(earlier))
+    given = ("--left", "left", "--right", "off", "--align", "earlier.json", "-o", "later.csv", "-q")
+    assert rollcli("estimate", *given, cwd=pairs).status == 0
+    assert rollcli("rig", "later.csv", "--correction", "later.json", "-q", cwd=pairs).status == 0
+    later = json.loads((pairs / "later.json").read_text())
+    assert all(abs(later[name] - truth) < NEAR[name] for name, truth in TRUTH.items())
+
+
 def test_a_correction_is_for_views_of_its_shape_at_any_size(pairs):
     for side in ("left", "right"):
         view = cv2.imread(str(pairs / side / "frame_0001.png"))
