@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rollcli.files.results import Row
+from rollcli.rig.drive.assess import drive_of
 from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.quantities import ROLL, Quantity
 from rollcli.rig.words import answer
@@ -42,9 +43,9 @@ def with_interval(value: float | None, half_width: float | None, quantity: Quant
 
 
 def input_folders(rows: Sequence[Row]) -> list[str]:
-    """List the folders that the frames lie in, in order of appearance; "." is where `estimate` ran."""
+    """List the recordings or folders of the frames, in order of appearance; "." is where `estimate` ran."""
     names = [name for row in rows for name in (row.file, row.right_file) if name]
-    return list(dict.fromkeys(posixpath.dirname(name) or "." for name in names))
+    return list(dict.fromkeys(drive_of(name) or posixpath.dirname(name) or "." for name in names))
 
 
 def written_at(result: str) -> str:

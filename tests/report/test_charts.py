@@ -8,7 +8,7 @@ import pytest
 
 from rollcli.report.charts import chart_over_frames
 from rollcli.report.page import Chart, script_json
-from rollcli.report.summary import written_at
+from rollcli.report.summary import input_folders, written_at
 from rollcli.rig.drive.assess import assess_rig
 from rollcli.rig.quantities import ROLL
 from tests.report.results import row
@@ -28,6 +28,12 @@ def test_the_time_of_a_file_is_told_in_utc_and_that_of_a_stream_is_not(tmp_path)
     os.utime(tmp_path / "rolls.csv", (86_400 * 365 + 3_720, 86_400 * 365 + 3_720))
     assert written_at(str(tmp_path / "rolls.csv")) == "1971-01-01 01:02 UTC"
     assert written_at("-") == written_at("s3://maps/rolls.csv") == written_at("a\0b") == ""
+
+
+def test_frames_of_recordings_and_archives_are_from_these():
+    files = ["a.png", "/a.png", "maps/a.png", "run.zip#a.png", "drive.mp4#000123", "drive.mcap#/left/map@12"]
+    sources = [".", "/", "maps", "run.zip", "drive.mp4", "drive.mcap"]
+    assert input_folders([row(file) for file in files]) == sources
 
 
 def test_json_in_a_script_cannot_end_it():
