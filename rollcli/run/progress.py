@@ -21,6 +21,7 @@ from rollcli.rig.calibration import Calibration
 from rollcli.rig.quantities import COLUMNS, SIZE
 from rollcli.run.frame import FrameResult
 from rollcli.run.options import FramesOptions, RunningOptions
+from rollcli.stereo.correction import Correction
 from rollcli.stereo.misalignment import advice_of
 
 _MOST_FRAMES = 1_000_000  # that the rig's roll is told of: their names and numbers take 150 MB
@@ -99,15 +100,21 @@ class RunSummary:
         """The exit status of a run that came to its end."""
         return ExitStatus.FRAMES_FAILED if self.counts["error"] else ExitStatus.DONE
 
-    def alignment(self) -> dict[str, float | int | str] | None:
+    def alignment(self, told: Correction | None = None) -> dict[str, float | int | str] | None:
         """Return the medians of how the views lay, for the run's record; None where no pair was measured.
 
-        Their `advice` is what to do about it, in a sentence; empty where the median is level.
+        Their `advice` is what to do about it, in a sentence; empty where the median is level, or lies as a
+        correction that was `told` says.
         """
         lay = {name: self._median(name) for name in ALIGNMENT_COLUMNS}
         frames = len(self._known(ALIGNMENT_COLUMNS[0]))
         rounded = {name: round(value, 4) + 0.0 for name, value in lay.items() if value is not None}
-        advice = advice_of(*(value or 0.0 for value in lay.values()))
+        left = [value or 0.0 for value in lay.values()]
+        width, height = (round(self._median(name) or 0) for name in SIZE)
+        if told is not None and frames and width and height:
+            level = told.resized(width, height).lies.values(height, width)
+            left = [value - known for value, known in zip(left, level, strict=True)]
+        advice = advice_of(*left)
         return {"frames": frames, **rounded, "advice": advice} if frames else None
 
     def rig_roll(self) -> str:
@@ -321,7 +328,7 @@ class Progress(TaskProgress):
         super().__init__(total, options.running)
         self.summary = summary or RunSummary()
         self.kept = self.summary.frames
-        self._statuses = statuses
+        self._statuses, self._told = statuses, options.stereo.correction
         self._auto = options.encoding.encoding == "auto" and options.encoding.scale is None
         self._failures, self._warnings = Causes(), Causes()
 
@@ -374,5 +381,6 @@ class Progress(TaskProgress):
         by_status = [f"{counts[status]} {status}" for status in self._statuses]
         by_status.append(f"{counts['error']} failed")
         self.note(f"{self.frames()}: {', '.join(by_status)}; {self.seconds:.1f} s, {self.speed()}")
-        if advice := (self.summary.alignment() or {}).get("advice"):
-            self.note(f"median over the pairs: {advice}")
+        if advice := (self.summary.alignment(self._told) or {}).get("advice"):
+            beside = "" if self._told is None else "beside what --align says, "
+            self.note(f"median over the pairs: {beside}{advice}")

@@ -128,7 +128,7 @@ class RunRecord:
             "encoding": sorted(self.read_as.encodings),
             "disparities_searched_px": list(self.read_as.searched or ()),
             **({"downscale": self.read_as.downscale} if self.read_as.downscale > 1 else {}),
-            "alignment": summary and summary.alignment(),
+            "alignment": summary and summary.alignment(self.plan.options.stereo.correction),
             "conventions": CONVENTIONS,
             "counts": summary.totals if summary else {},
             **({_REPLACES: True} if self.replaces and not summary else {}),

@@ -2,11 +2,13 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import pytest
 
 from rollcli.files.results import Row
 from rollcli.run.progress import RunSummary
+from rollcli.stereo.correction import Correction
 from rollcli.stereo.misalignment import Misalignment, advice_of
 
 
@@ -60,6 +62,18 @@ def test_a_run_says_the_median_over_its_pairs_and_what_to_do():
         "the right camera is rolled by 0.31 degrees against the left, counter-clockwise seen from behind: "
         "recalibrate"
     )
+
+
+@pytest.mark.parametrize(("turned", "advised"), [(0.3, ""), (0.36, "rolled by 0.06 degrees")])
+def test_a_run_asks_for_what_is_left_beside_its_correction_at_any_size(turned, advised):
+    told = Correction(Misalignment.of_values((2.0, 0.3, 0.0, 0.0), 480, 640), None, 0.0, 640, 480)
+    rig = RunSummary()
+    rig.add_row(replace(row(1.0, turned), width=320, height=240))
+
+    advice = rig.alignment(told)["advice"]
+    assert advised in advice
+    assert bool(advice) == bool(advised)
+    assert "lower" not in advice
 
 
 def test_a_run_of_mostly_level_pairs_asks_for_nothing():
