@@ -170,7 +170,7 @@ def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:
     Raises
     ------
     InputError
-        Truncated, damaged, or a JPEG.
+        Truncated, damaged, a JPEG, or a TIFF of several pages.
     """
     with about(name):
         if data.startswith(png.SIGNATURE):
@@ -180,7 +180,10 @@ def decode_mask(data: bytes, name: str) -> NDArray[np.bool_]:
         elif data.startswith(pictures.SIGNATURES):
             raise InputError("is a JPEG, whose black is not all 0: save the mask as PNG")
         else:
-            pixels = _format_of(data).decode(data).values
+            stored = _format_of(data).decode(data)
+            if stored.note:  # another page may be the one that is meant
+                raise InputError("holds several pages; save the mask that is meant as a file of its own")
+            pixels = stored.values
     return usable_of(pixels if pixels.ndim == 2 else pixels.max(axis=2))
 
 

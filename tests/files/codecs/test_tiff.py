@@ -144,9 +144,15 @@ def test_colours_lie_side_by_side_or_in_a_plane_each(kind, layout, planes):
 # TIFF 6.0, NewSubfileType: bit 0 is a reduced copy, bit 1 a page of many, bit 2 a mask of another image
 @pytest.mark.parametrize(("kind", "is_said"), [(0, True), (1, False), (2, True), (4, False), (5, False)])
 def test_a_second_page_is_said_unless_it_belongs_to_the_first(kind, is_said):
-    stored = decode_stored(make_tiff(VALUES, pages=2, page_kind=kind), "map.tif")
+    two = make_tiff(VALUES, pages=2, page_kind=kind)
+    stored = decode_stored(two, "map.tif")
 
     assert stored.note == ("map.tif holds several pages; the first is read" if is_said else "")
+    if is_said:  # a mask of the wrong page would leave out other pixels, without a trace
+        with pytest.raises(InputError, match=r"mask\.tif: holds several pages; save the mask"):
+            decode_mask(two, "mask.tif")
+    else:
+        assert decode_mask(two, "mask.tif").shape == VALUES.shape
 
 
 def test_a_volume_is_no_map():
