@@ -1,6 +1,7 @@
 """v-disparity [VD]: the histogram of each row's disparities, as counts and as a picture."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -46,7 +47,7 @@ def v_disparity(
         At most 65535; by default one a pixel for maps of whole pixels, else four a pixel and at least 256,
         within 1024.
     max_disparity : float, optional
-        Pixels; by default just above the largest of the map.
+        Pixels; by default just above the largest of the map, where a few far beyond all others do not count.
 
     Raises
     ------
@@ -64,14 +65,29 @@ def v_disparity(
     if values.ndim != 2 or values.dtype.kind not in "fiub":
         raise UsageError(f"a disparity map is 2-D and real, not of shape {values.shape} and {values.dtype}")
     blocks = [values[rows] for rows in strips(len(values), _BLOCK // max(1, values.shape[1]))]
+    whole = all(bool((pixels == np.rint(pixels)).all()) for pixels in map(_pixels, blocks))
     if max_disparity is None:
-        max_disparity = math.floor(max((_pixels(each).max(initial=0) for each in blocks), default=0)) + 1.0
+        max_disparity = _end_of(blocks, 1 if whole else 4)
     if not 0 < max_disparity < math.inf or not (bins is None or 0 < bins <= _MOST_BINS):
         most = f"at most {_MOST_BINS} bins"
         raise UsageError(f"bins {bins} and max-disparity {max_disparity}: both must be positive, {most}")
     if bins is None:
-        whole = all(bool((pixels == np.rint(pixels)).all()) for pixels in map(_pixels, blocks))
         bins = min(math.ceil(max_disparity) if whole else max(256, math.ceil(4 * max_disparity)), _MAX_BINS)
+    return _histogram(blocks, bins, max_disparity)
+
+
+def _end_of(blocks: Sequence[NDArray[Any]], per_pixel: int) -> float:
+    """Find the right end of a histogram with so many bins a pixel: those beyond may be a few far outliers."""
+    end = math.floor(max((_pixels(each).max(initial=0) for each in blocks), default=0)) + 1.0
+    while end * per_pixel > _MAX_BINS:
+        near = 2 * shown_end(_histogram(blocks, _MAX_BINS, end))
+        if near >= end:
+            break
+        end = near
+    return end
+
+
+def _histogram(blocks: Sequence[NDArray[Any]], bins: int, max_disparity: float) -> VDisparity:
     counts = [_counts(_pixels(each), bins, max_disparity) for each in blocks]
     return VDisparity(np.concatenate([np.zeros((0, bins), np.int32), *counts]), max_disparity)
 

@@ -259,7 +259,8 @@ def _counted(source: Source, of: Frame, options: VDisparityOptions, paths: Mappi
             horizon = None if y is None else column.row(y)
     files = {paths["vdisparity"]: encode_png(draw_v_disparity(histogram, curve, horizon))}
     if options.counts:
-        files[paths["counts"]] = encode_stored(histogram.counts, "tiff")
+        says = f"columns divide 0 to {histogram.max_disparity:g} px evenly"
+        files[paths["counts"]] = encode_stored(histogram.counts, "tiff", text=says)
     return files, {**source.warnings, likeness: likeness}
 
 

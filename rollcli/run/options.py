@@ -540,9 +540,10 @@ class VDisparityOptions(ConvertOptions):
         and at least 256; at most 1024]
     max_disparity : float or None
         Right end of the histogram, pixels; its last bin also holds what lies beyond. [default: just above
-        the map's largest]
+        the map's largest, a few far beyond all others aside]
     counts : bool
-        Write the counts too, as a 32-bit TIFF beside the picture; a row sums to its valid pixels.
+        Write the counts too, as a 32-bit TIFF beside the picture, whose description names the right end; a
+        row sums to its valid pixels.
     figure : str or None
         Write a figure for a paper in place of the picture: map and v-disparity, as they are and
         de-rotated, with the road's curve, as wide as a journal's column (3.5 inches).

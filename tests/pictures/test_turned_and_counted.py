@@ -89,6 +89,21 @@ def test_disparities_are_counted_in_the_bins_that_hold_them(monkeypatch, block):
     assert (v_disparity([range(22)]).counts == [[0] + 21 * [1]]).all()  # where 15 / 22 * 22 is less than 15
 
 
+@pytest.mark.parametrize("outlier", [5_000, 65_535.5, 1e9])
+def test_one_pixel_far_beyond_leaves_all_others_a_bin_each_quarter_pixel(outlier):
+    values = np.random.default_rng(2).uniform(1, 60, (40, 50))
+    values[3, 3] = outlier
+
+    found = v_disparity(values)
+
+    assert found.counts.shape[1] >= 4 * found.max_disparity
+    assert (found.counts[:, -1] == [each == 3 for each in range(40)]).all()
+    assert (found.counts.sum(axis=1) == 50).all()
+    assert v_disparity(np.where(values > 60, 500, values)).max_disparity == 128
+    near = np.where(np.arange(40)[:, None] < 2, 300, values)  # a twentieth of the map is no outlier
+    assert v_disparity(np.where(values > 60, 0, near)).max_disparity == 301
+
+
 SHAPE = (97, 141)
 
 

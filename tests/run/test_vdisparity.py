@@ -4,8 +4,10 @@ import math
 import re
 import xml.etree.ElementTree as ET
 
+import cv2
 import numpy as np
 import pytest
+import tifffile
 
 from tests.run_cli import road_map, rollcli, rollcli_process, write_kitti
 
@@ -66,3 +68,14 @@ def test_nothing_of_matplotlibs_own_files_is_told(maps):
     nowhere = dict.fromkeys(("HOME", "MPLCONFIGDIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME"), "/dev/null/no")
     line = ("vdisparity", "maps/frame0.png", "--figure", "svg", "-o", "v", "-q")
     assert rollcli_process(*line, cwd=maps, **nowhere)[::2] == (0, "")
+
+
+def test_the_counts_are_a_histogram_up_to_the_end_that_their_file_names(maps):
+    assert rollcli("vdisparity", "maps", "--counts", "-o", "v", cwd=maps).status == 0
+    for path in sorted((maps / "v").glob("*.tif*")):
+        with tifffile.TiffFile(path) as file:
+            counts, says = file.asarray(), file.pages[0].description
+        end = float(re.fullmatch(r"columns divide 0 to ([\d.]+) px evenly", says)[1])
+        stored = cv2.imread(str(maps / "maps" / path.name.split(".")[0]) + ".png", cv2.IMREAD_UNCHANGED)
+        expected = [np.histogram(row[row > 0] / 256, counts.shape[1], (0, end))[0] for row in stored]
+        np.testing.assert_array_equal(counts, expected)
