@@ -98,10 +98,11 @@ class RunRecord:
         if self._begun:
             check_owned(self.plan.output, self.run)
 
-    def continue_from(self, earlier: Mapping[str, Any]) -> None:
-        """Take over what the interrupted run has recorded about its inputs."""
-        encodings, searched = frozenset(earlier["encoding"]), tuple(earlier["disparities_searched_px"])
-        self.read_as = ReadAs(encodings, searched or None, recorded_downscale(earlier, self.plan.output))
+    def continue_from(self, earlier: Mapping[str, Any], kept: "KeptRows") -> None:
+        """Take over what the interrupted run has recorded about the inputs of the rows that are kept."""
+        if kept.count > len(kept.again):
+            encodings, searched = frozenset(earlier["encoding"]), tuple(earlier["disparities_searched_px"])
+            self.read_as = ReadAs(encodings, searched or None, recorded_downscale(earlier, self.plan.output))
         self.replaces |= earlier.get(_REPLACES) is True
 
     def saw(self, read_as: ReadAs) -> None:
@@ -540,7 +541,7 @@ def checked_record(plan: Plan, kept: KeptRows, parts: Sequence[str] = ()) -> Run
         if found:  # what is there is of another run
             outputs.check_nothing_is_there(outputs.files_of(plan.frames, options.writes))
         elif earlier is not None:
-            record.continue_from(earlier)
+            record.continue_from(earlier, kept)
     return record
 
 

@@ -1,8 +1,10 @@
 """A result is updated to the bytes of a run on the inputs as they are; identical bytes count as unchanged."""
 
+import json
 import os
 from unittest.mock import Mock
 
+import numpy as np
 import pytest
 
 from rollcli.files.storage import read_bytes, remove, write_bytes
@@ -138,3 +140,13 @@ def test_objects_are_compared_by_their_tags(tmp_path, bucket, monkeypatch):
     )
     assert "(3 kept)" in estimate(tmp_path, "--update", **line).err
     assert read == [f"{folder}/frame2.png"]
+
+
+def test_an_update_that_keeps_no_row_records_how_the_maps_of_now_were_read(tmp_path):
+    """Else `rig` would ask of maps that were exported anew whether they are one rig's."""
+    folder = estimated(tmp_path, 2)
+    for path in sorted((folder / "maps").iterdir()):
+        np.save(path.with_suffix(".npy"), road_map(0.1))
+        path.unlink()
+    estimate(folder, "--update")
+    assert json.loads((folder / "rolls.csv.run.json").read_text())["encoding"] == ["px"]
