@@ -383,7 +383,7 @@ def _heights(
     """Compare the heights over the road in these folders."""
     try:
         found = assess_heights(rows, known, *folders) if folders else {}
-    except InputError as error:
+    except (InputError, UsageError) as error:
         if options.heights is not None:
             raise
         options.running.note(f"no heights are compared: {error}")  # nobody has asked for them

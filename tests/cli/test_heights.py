@@ -70,6 +70,9 @@ def test_heights_of_another_size_do_not_keep_accuracy_from_comparing_angles(tmp_
     assert "no heights are compared: half/frame_0001.tif" in done.err
     assert "differ in size" in done.err
     assert rollcli(*arguments, "--heights", "half", cwd=tmp_path).status == 2
+    for path in (tmp_path / "half").iterdir():  # as `simulate --overwrite` without --dips leaves true ones
+        path.unlink()
+    assert "no heights are compared: half: no input found" in rollcli(*arguments, cwd=tmp_path).err
 
 
 def test_heights_of_a_result_are_those_of_the_run(rendered):
