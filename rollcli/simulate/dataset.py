@@ -50,6 +50,7 @@ def truth_csv(frames: Iterable[tuple[str, FrameSpec]]) -> bytes:
 
 def _truth_of(spec: FrameSpec) -> dict[str, str | int]:
     low, high = lane_rolls_of(spec)
+    carriageway = carriageway_of(spec)
     return {
         "roll_deg": _degrees(spec.roll, 9),
         "pitch_deg": _degrees(spec.pitch, 9),
@@ -59,14 +60,15 @@ def _truth_of(spec: FrameSpec) -> dict[str, str | int]:
         "cy_px": _number(spec.centre[1]),
         "baseline_m": _number(spec.baseline),
         "height_m": _number(spec.height),
-        "curvature_per_m": _number(spec.curvature),
+        # what fits a rough lane bends, too: pitch and height below the camera are not those ahead
+        "curvature_per_m": _number(spec.curvature + 2 * carriageway.fit_ahead[3]),
         "seed": spec.seed,
         "cross_section": spec.cross_section,
         "crossfall_percent": _number(100 * spec.crossfall),
         "gutter_percent": _number(100 * spec.gutter),
         # a roof has a ridge instead of a curvature
         "camber": "" if spec.cross_section == "roof" else _number(road_camber(spec)),
-        "bend_per_m": _number(carriageway_of(spec).course.bend),
+        "bend_per_m": _number(carriageway.course.bend),
         "roughness": spec.roughness or "",
         "lane_lo_deg": _degrees(low, 6),
         "lane_hi_deg": _degrees(high, 6),

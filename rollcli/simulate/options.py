@@ -29,8 +29,8 @@ class Rendering:
     ----------
     roughness : str or None
         Class of the road's unevenness by ISO 8608, along and across, with mended patches and sunken
-        tracks; A: new asphalt, C: an old road, E: gravel. Roll, pitch and height are against the plane
-        that fits the lane ahead. [default: a smooth road]
+        tracks; A: new asphalt, C: an old road, E: gravel. Roll, pitch and height are against the
+        parabola that fits the lane ahead, below the camera. [default: a smooth road]
     dips : int or None
         Dips and bumps of 2.5 to 7 cm in the lane ahead of each road, and DIR/heights: how high the ground
         lies over the road, metres, float32 TIFF; 0: kerbs and pavements alone. [default: neither]

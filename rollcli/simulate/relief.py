@@ -196,7 +196,7 @@ def draw_relief(
     Returns
     -------
     Relief
-        At a height of 0 below the rig, on the plane that fits the lane ahead (`lane_plane`).
+        At a height of 0 below the rig, on the parabola that fits the lane ahead (`lane_plane`).
     """
     scale = 2.0 ** ROUGHNESS.index(roughness)  # of heights, whose squares are four times as large
     lateral, z = LEFT + STEP * np.arange(_ACROSS), _START + STEP * np.arange(_ALONG)

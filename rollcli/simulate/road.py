@@ -116,7 +116,7 @@ class Carriageway:
     def normal(self) -> Array:
         """The upward unit normal (3,) of the plane that touches the road where the rig stands.
 
-        On a rough road: of the plane that fits the lane ahead, in place of what lies below the wheels.
+        On a rough road: of the parabola that fits the lane ahead, in place of what lies below the wheels.
         """
         _, right, rising, _ = self.fit_ahead
         slope = self.section.piece(0.0).slope + right

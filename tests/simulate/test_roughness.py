@@ -1,5 +1,6 @@
 """Rough roads against ISO 8608 and isotropy, on what is drawn; their truth on what is rendered."""
 
+import csv
 import functools
 import math
 from itertools import product
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 
 from rollcli.simulate.build import build_scene, carriageway_of, render_frame
-from rollcli.simulate.dataset import lane_rolls_of
+from rollcli.simulate.dataset import lane_rolls_of, truth_csv
 from rollcli.simulate.relief import LEFT, STEP, draw_relief
 from rollcli.simulate.spec import FrameSpec
 from tests.slow import mostly_slow
@@ -97,6 +98,8 @@ def test_the_lane_of_a_rough_road_has_the_rolls_of_its_pixels_and_no_height(seed
     course = carriageway_of(spec).course
     used = (np.abs(x - z * course.heading) < 1.2) & (z > 4) & (z < 20)
     design = np.array([np.ones_like(x), x, z, z * z])[:, used]
-    roll = math.atan(np.linalg.lstsq(design.T, y[used], rcond=None)[0][1])
-    assert low - 0.0007 < roll < high + 0.0007
+    fitted = np.linalg.lstsq(design.T, y[used], rcond=None)[0]
+    assert low - 0.0007 < math.atan(fitted[1]) < high + 0.0007
+    (truth,) = csv.DictReader(truth_csv([("frame", spec)]).decode().splitlines())
+    assert float(truth["curvature_per_m"]) == pytest.approx(-2 * fitted[3], abs=1e-4)  # y points down
     assert abs(render_frame(spec).heights[road][used].mean()) < 0.001
