@@ -566,19 +566,21 @@ def _differences(kept: KeptRows, was: Mapping[str, Any] | None, record: RunRecor
         now = RunRecord(replace(plan, frames=frames)).fixed
     if was.get("calibration") != json.loads(json.dumps(now.get("calibration"))):
         yield "the calibration differs"
-    hint = "; new frames must sort last, or be added by --update" if grown else ""
+    updates = not plan.options.result.in_parts
+    hint = "; --update leaves out the rows of frames that are gone" if updates else ""
+    if grown:
+        hint = f"; new frames must sort last{', or be added by --update' if updates else ''}"
     if kept.mismatch:
         yield f"the inputs differ: {kept.mismatch}{hint}"
     if kept.count > len(frames):
-        how = "" if plan.options.result.in_parts else "; --update leaves out the rows of frames that are gone"
-        yield f"it has {kept.count} rows, and there are {len(frames)} frames{how}"
+        yield f"it has {kept.count} rows, and there are {len(frames)} frames{hint}"
     inputs_was, inputs_now = was["inputs"], now["inputs"]
     if inputs_was.get("frames") != inputs_now["frames"]:
         yield f"it was begun with {inputs_was.get('frames')} frames, now there are {inputs_now['frames']}"
     if inputs_was.get("names") != inputs_now["names"]:
         yield f"the names of the inputs differ{hint}"
     if kept.changed:
-        how = "" if plan.options.result.in_parts else "; --update does again what has changed"
+        how = "; --update does again what has changed" if updates else ""
         if {frames[at].file for at in kept.errors}.issuperset(kept.changed):
             how = "; --retry-failed does again what has failed"
         also = {"right image": plan.options.paired, "mask": plan.options.region.mask}

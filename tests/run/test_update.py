@@ -150,3 +150,16 @@ def test_an_update_that_keeps_no_row_records_how_the_maps_of_now_were_read(tmp_p
         path.unlink()
     estimate(folder, "--update")
     assert json.loads((folder / "rolls.csv.run.json").read_text())["encoding"] == ["px"]
+
+
+@pytest.mark.parametrize("result", mostly_slow(["rolls.csv", "rolls.parquet"], "rolls.csv"))
+def test_frames_that_were_added_amid_or_are_gone_are_told_of_an_update_where_it_is_possible(tmp_path, result):
+    write_maps(tmp_path / "maps", 3)
+    estimate(tmp_path, result=result)
+    put(tmp_path, "frame0a")
+    added = estimate(tmp_path, "--resume", result=result, status=2).err
+    (tmp_path / "maps" / "frame0a.png").unlink()
+    (tmp_path / "maps" / "frame1.png").unlink()
+    gone = estimate(tmp_path, "--resume", result=result, status=2).err
+    taken = estimate(tmp_path, "--update", result=result, status=0 if result == "rolls.csv" else 2)
+    assert ["--update" in said for said in (added, gone)] == [taken.status == 0] * 2
