@@ -131,7 +131,7 @@ def v_disparity_figure(
     as_it_is = v_disparity(disparity, bins=bins, max_disparity=max_disparity)
     # colours and counts to the same end: both rows are read by the numbers below
     counted = as_it_is, v_disparity(maps[1], bins=bins, max_disparity=as_it_is.max_disparity)
-    end, top = shown_end(as_it_is), brightest(disparity)
+    end, top = max_disparity or shown_end(as_it_is), brightest(disparity)
     with drawing_style(PRINT):
         tall = 2 * _MAP_WIDTH * height / width + _AROUND
         figure = Figure((COLUMN / 72, tall / 72), layout="constrained")

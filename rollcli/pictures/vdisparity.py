@@ -150,7 +150,10 @@ _HORIZON = (120, 220, 120)
 
 
 def draw_v_disparity(
-    histogram: VDisparity, curve: Parabola | None = None, horizon: float | None = None
+    histogram: VDisparity,
+    curve: Parabola | None = None,
+    horizon: float | None = None,
+    end: float | None = None,
 ) -> Pixels:
     """Draw counts: log scale, bright where many, with the road's parabola and the horizon over them.
 
@@ -162,6 +165,8 @@ def draw_v_disparity(
         The road: d = a0 + a1 row + a2 row^2, pixels; see `MiddleColumn.profile`.
     horizon : float, optional
         The row of the road's horizon, pixels.
+    end : float, optional
+        The disparity at the right end of the picture, pixels; by default `shown_end`.
 
     Returns
     -------
@@ -170,7 +175,7 @@ def draw_v_disparity(
         Width, margins and letters are twice as large for 960 rows, three times for 1440, and so on.
     """
     unit = max(1, len(histogram.counts) // _UNIT_ROWS)
-    counts, top = shown_counts(histogram, _WIDTH * unit, shown_end(histogram))
+    counts, top = shown_counts(histogram, _WIDTH * unit, end or shown_end(histogram))
     light = np.log1p(counts)
     brightest = float(np.percentile(light[counts > 0], 99.9)) if counts.any() else 1.0
     grey = np.minimum(light * (255 / brightest), 255).astype(np.uint8)

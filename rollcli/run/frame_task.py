@@ -257,7 +257,8 @@ def _counted(source: Source, of: Frame, options: VDisparityOptions, paths: Mappi
         if (calibration := source.calibrated(of.calibration)) is not None:
             y = horizon_row(estimate.tangent, calibration)
             horizon = None if y is None else column.row(y)
-    files = {paths["vdisparity"]: encode_png(draw_v_disparity(histogram, curve, horizon))}
+    picture = draw_v_disparity(histogram, curve, horizon, options.max_disparity)
+    files = {paths["vdisparity"]: encode_png(picture)}
     if options.counts:
         says = f"columns divide 0 to {histogram.max_disparity:g} px evenly"
         files[paths["counts"]] = encode_stored(histogram.counts, "tiff", text=says)

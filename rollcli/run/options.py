@@ -539,8 +539,8 @@ class VDisparityOptions(ConvertOptions):
         Columns of the histogram. [default: one a pixel of disparity for maps of whole pixels, else four
         and at least 256; at most 1024]
     max_disparity : float or None
-        Right end of the histogram, pixels; its last bin also holds what lies beyond. [default: just above
-        the map's largest, a few far beyond all others aside]
+        Right end of the histogram and its picture, pixels; the last bin also holds what lies beyond.
+        [default: just above the map's largest, a few far beyond all others aside]
     counts : bool
         Write the counts too, as a 32-bit TIFF beside the picture, whose description names the right end; a
         row sums to its valid pixels.

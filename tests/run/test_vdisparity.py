@@ -79,3 +79,15 @@ def test_the_counts_are_a_histogram_up_to_the_end_that_their_file_names(maps):
         stored = cv2.imread(str(maps / "maps" / path.name.split(".")[0]) + ".png", cv2.IMREAD_UNCHANGED)
         expected = [np.histogram(row[row > 0] / 256, counts.shape[1], (0, end))[0] for row in stored]
         np.testing.assert_array_equal(counts, expected)
+
+
+def test_pictures_and_figures_end_where_it_is_asked(maps):
+    """As those of a drive do that are shown one after the other; the maps have up to 56 px."""
+    line = ("vdisparity", "maps/frame0.png", "--max-disparity", "160")
+    assert rollcli(*line, "-o", "wide", cwd=maps).status == 0
+    picture = cv2.imread(str(maps / "wide" / "frame0.png"))
+    _, columns = np.nonzero(picture[:120, 40:].max(axis=2) > 40)
+    assert columns.max() / (picture.shape[1] - 40) == pytest.approx(56 / 160, abs=0.02)
+    assert rollcli(*line, "--figure", "svg", "-o", "figure", cwd=maps).status == 0
+    below = numbers_beside_axes(ET.parse(maps / "figure" / "frame0.svg").getroot(), "middle")
+    assert below[below[:, 1] > 170, 0].max() == 160 - 160 % 50
