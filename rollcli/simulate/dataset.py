@@ -60,8 +60,7 @@ def _truth_of(spec: FrameSpec) -> dict[str, str | int]:
         "cy_px": _number(spec.centre[1]),
         "baseline_m": _number(spec.baseline),
         "height_m": _number(spec.height),
-        # what fits a rough lane bends, too: pitch and height below the camera are not those ahead
-        "curvature_per_m": _number(spec.curvature + 2 * carriageway.fit_ahead[3]),
+        "curvature_per_m": _number(carriageway.curvature_ahead),
         "seed": spec.seed,
         "cross_section": spec.cross_section,
         "crossfall_percent": _number(100 * spec.crossfall),

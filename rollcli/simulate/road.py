@@ -113,6 +113,12 @@ class Carriageway:
         return [0.0] * 4 if self.relief is None else lane_plane(self.relief)
 
     @property
+    def curvature_ahead(self) -> float:
+        """How the road curves upward straight ahead of the rig, 1/m: in a bend its slope across does, too."""
+        across, (_, _, _, uneven) = self.section.piece(0.0).slope, self.fit_ahead
+        return self.course.curvature - across * self.course.bend + 2 * uneven
+
+    @property
     def normal(self) -> Array:
         """The upward unit normal (3,) of the plane that touches the road where the rig stands.
 

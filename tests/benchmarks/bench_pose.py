@@ -45,7 +45,7 @@ def judged(frame: Matched):
     posed = with_pose(estimate_roll(frame.disparity), nominal)
     tangent = posed.tangent
     distance = spec.focal * spec.baseline / tangent.disparity
-    curvature = spec.curvature + 2 * carriageway_of(spec).fit_ahead[3]
+    curvature = carriageway_of(spec).curvature_ahead
     bend = math.atan(curvature * distance)
     pitch = spec.pitch + bend
     above = (spec.height + curvature * distance**2 / 2) * math.cos(bend)

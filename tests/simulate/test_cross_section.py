@@ -1,11 +1,13 @@
 """Roads with a cross section: each pixel shows the point that an independent march along its ray finds."""
 
+import csv
 import math
 
 import numpy as np
 import pytest
 
 from rollcli.simulate.build import build_scene, carriageway_of
+from rollcli.simulate.dataset import truth_csv
 from rollcli.simulate.spec import FrameSpec
 from rollcli.simulate.surfaces import Ground
 from tests.slow import mostly_slow
@@ -97,6 +99,17 @@ def test_every_road_pixel_shows_the_first_point_that_a_march_along_its_ray_finds
     # a march can step over the outermost centimetres of the road beside a kerb
     assert np.mean(np.isnan(marched)) < 0.01
     assert np.nanmax(np.abs(marched - disparity[v, u])) < 1e-6
+
+
+@pytest.mark.parametrize("shape", ["flat", *SHAPES])
+def test_truth_says_how_the_road_bends_upward_ahead_of_the_rig(shape):
+    crossfall = 0.0 if shape == "flat" else 0.04
+    spec = FrameSpec("bare", curvature=0.001, bend=0.006, cross_section=shape, crossfall=crossfall)
+    road = carriageway_of(spec)
+    x, y, z = road.course.heading, 0.0, 1.0  # straight ahead
+    below, _ = height_over_road(spec, road, np.array([x, y, z]))
+    (truth,) = csv.DictReader(truth_csv([("frame", spec)]).decode().splitlines())
+    assert float(truth["curvature_per_m"]) == pytest.approx(-2 * below / z**2, abs=1e-6)
 
 
 @pytest.mark.parametrize("shape", ["flat", *SHAPES])
