@@ -133,7 +133,8 @@ def _rows_of(frames: Sequence[Frame], result: str, options: ConvertOptions) -> l
     lost = [rows[at] for at in sorted(set(range(len(rows))).difference(used))]
     angled = [row.file for row in lost if row.roll_deg is not None]
     if angled and not isinstance(options, VDisparityOptions):
-        raise UsageError(f"{result}: no map is given for its rows of {listed(angled)}")
+        remedy = "give all of its maps, or a result of these alone"
+        raise UsageError(f"{result}: no map is given for its rows of {listed(angled)}: {remedy}")
     matched = [rows[at] for at in used]
     elsewhere = [
         (frame, row)
