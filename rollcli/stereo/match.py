@@ -1,5 +1,6 @@
 """Disparity maps from stereo pairs: range found, views levelled, then one match."""
 
+import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -384,16 +385,21 @@ def _match_as_told(
     match: Callable[[Misalignment], Map], small: SmallViews, told: Correction, *, check: bool
 ) -> _Matched:
     """Match views that lie as is told, and `check` whether they do."""
-    disparity, corrected, doubt = match(told.lies), told.lies, ""
+    disparity, columns = match(told.lies), told.columns
     measured = small.measure(disparity, told.lies) if check else None
-    if measured is not None:
-        lies, errors = measured.misalignment, measured.errors
-        # but for what refinement takes away
-        if _KEPT._replace(sure=4.0).allows(lies - told.lies, errors, small.shape):
-            corrected = told.of_pair(lies.offset, errors.offset).rounded(*small.shape)
-        else:
-            doubt = CONTRADICTS
-    return _Matched(disparity, corrected, measured, doubt, told.columns)
+    if measured is None:
+        return _Matched(disparity, told.lies, None, told=columns)
+    lies, errors, shape = measured.misalignment, measured.errors, small.shape
+    since = lies - told.lies
+    # but for what refinement takes away
+    if not _KEPT._replace(sure=4.0).allows(since, errors, shape):
+        return _Matched(disparity, told.lies, measured, CONTRADICTS, columns)
+    if columns is not None and not TOLERANCE.allows(replace(since, offset=0.0), errors, shape):
+        # columns may have moved as much as rows have
+        error = support_of_level(since, errors, shape[0]).error
+        columns = replace(columns, error=math.hypot(columns.error, error))
+    corrected = told.of_pair(lies.offset, errors.offset).rounded(*shape)
+    return _Matched(disparity, corrected, measured, told=columns)
 
 
 def _match_levelled(

@@ -179,6 +179,19 @@ def test_a_drive_says_how_its_pairs_lie_and_not_what_an_earlier_correction_says(
     assert all(abs(later[name] - truth) < NEAR[name] for name, truth in TRUTH.items())
 
 
+def test_intervals_hold_where_right_views_have_grown_a_little_since_the_correction(pairs):
+    (pairs / "grown").mkdir()
+    for path in sorted((pairs / "right").iterdir()):
+        view = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        grown = seen_by(view, clockwise_deg=0.15, larger_percent=0.4, lower=1.2, border=cv2.BORDER_REPLICATE)
+        cv2.imwrite(str(pairs / "grown" / path.name), grown)
+    given = ("--left", "left", "--right", "grown", "--align", "use.json", "-o", "grown.csv", "-q")
+    assert rollcli("estimate", *given, cwd=pairs).status == 0
+    apart = np.abs(rolls(pairs / "grown.csv") - rolls(pairs / "level.csv"))
+    half = [float(row["roll_ci95_deg"]) for row in rows_of((pairs / "grown.csv").read_text())]
+    assert np.mean(apart <= half) >= 0.9
+
+
 def test_a_correction_is_for_views_of_its_shape_at_any_size(pairs):
     for side in ("left", "right"):
         view = cv2.imread(str(pairs / side / "frame_0001.png"))
