@@ -63,6 +63,19 @@ def test_rigs_that_differ_are_not_pooled_however_few_their_frames(frames):
     assert re.search(r"the drives differ: \+2\.\S+( ± \S+)? in a, -[23]\.\S+( ± \S+)? in b", line)
 
 
+@pytest.mark.parametrize("frames", [3, 7])
+def test_short_drives_of_one_rig_do_not_differ_by_the_sway_of_its_car(frames):
+    differing = 0
+    for trial in range(10):
+        parts = [
+            columns(*drive(100 * trial + each, frames, sd=0.3, phi=0.94), folder=f"data/{each}/")
+            for each in range(20)
+        ]
+        rig = rollcli.assess_rig(joined(*parts), groups="data/*")
+        differing += any(each.differs for each in rig.drives)
+    assert differing <= 1
+
+
 def test_images_of_two_sizes_are_two_drives_and_so_are_two_results():
     given = columns(*drive(1, 40, sd=0.1)) | {  # a frame that could not be read has no size
         "width": [None, *[640] * 19, None, *[320] * 19],
