@@ -11,7 +11,8 @@ import time
 import uuid
 import weakref
 from collections.abc import Collection, Iterator, Sequence
-from concurrent.futures import CancelledError, ThreadPoolExecutor
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from concurrent.futures import TimeoutError as FutureTimeoutError  # before Python 3.11 not the built-in one
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Generic
@@ -28,6 +29,7 @@ from rollcli.run.workers.pool import prepare_worker
 
 _CONNECT_S, _GREETING_S, _FIRST_WORKER_S = 6, 2, 5
 _POLL_S, _LOOK_S = 0.2, 1.0
+_ASKED_S = 10  # a worker that joins is asked within a second
 _MOST_TRIES = 5  # of a chunk, with workers that cannot do it
 _DIED = "every worker that tried it died: killed for memory, perhaps, or crashed"
 
@@ -69,7 +71,8 @@ async def _open_and_close(address: str) -> None:
 class ClusterExecutor(Generic[Task, Result]):
     """Runs chunks on the workers of a scheduler; Dask itself gives the chunk of a dead worker to another.
 
-    Workers that join are used at once, unless they cannot take part: a line says so then.
+    Workers that join are used at once, unless they cannot take part: a line says so then. Dask may give them
+    chunks before they are asked; these wait for the answer.
 
     Parameters
     ----------
@@ -109,8 +112,10 @@ class ClusterExecutor(Generic[Task, Result]):
             self._looked = time.monotonic()
         return max(sum(self._threads_of.values()), 1)
 
-    def take_in_workers(self) -> None:
-        """Take in workers that have joined, and say which of them cannot take part."""
+    def take_in_workers(self, *, anew: bool = False) -> None:
+        """Take in workers that have joined, and say which of them cannot take part; anew: ask all again."""
+        if anew:
+            self._threads_of = {}
         with contextlib.suppress(OSError):  # the scheduler is lost, which is said once Dask gives it up
             for worker, problem in self._look_for_workers().items():
                 say(f"worker {worker}: {problem}; it gets no work")
@@ -128,7 +133,7 @@ class ClusterExecutor(Generic[Task, Result]):
         # bytes: the scheduler would make objects of all else, and pickle them again
         told = pickle.dumps((self._work.job(self.threads, cluster=True), chunk), pickle.HIGHEST_PROTOCOL)
         sent = self._client.submit(
-            *(_do_chunk, __version__, self._run, told),
+            *(_do_chunk, self._run, told),
             pure=False,
             priority=priority,
             workers=sorted(chosen) or None,
@@ -143,6 +148,7 @@ class ClusterExecutor(Generic[Task, Result]):
     def wait(self, future: "ClusterFuture[Task, Result]") -> None:
         """Wait until a chunk is done, or for a fifth of a second."""
         self.check_connection()
+        _ = self.workers  # those that have joined are asked: the chunk may wait for that
         future.settled.wait(_POLL_S)
 
     def retry(self, chunk: Sequence[Task]) -> Done[Result]:
@@ -171,7 +177,7 @@ class ClusterExecutor(Generic[Task, Result]):
         """Take in workers that have joined, and leave out those that have gone; return problems by worker."""
         there = self._client.nthreads()
         new = [worker for worker in there if worker not in self._threads_of and worker not in self._refused]
-        problems, silent = _problems(self._client, self._asked, new) if new else ({}, set())
+        problems, silent = _problems(self._client, self._run, self._asked, new) if new else ({}, set())
         self._refused.update(problems)
         left_out = self._refused | silent  # those that did not answer are asked again
         self._threads_of = {worker: n for worker, n in there.items() if worker not in left_out}
@@ -203,9 +209,9 @@ class ClusterFuture(Generic[Task, Result]):
         """Tell whether the result is there."""
         if not self._sent.done():
             return False
-        failed = self._sent.status == "error" and self._tries < _MOST_TRIES
-        if failed and not _is_death(self._sent.exception()):  # of the worker: tasks' errors are results
-            self._executor.take_in_workers()
+        error = self._sent.exception() if self._sent.status == "error" else None  # tasks' errors are results
+        if error is not None and self._tries < _MOST_TRIES and not _is_death(error):
+            self._executor.take_in_workers(anew=isinstance(error, TimeoutError))
             self.send_again()
             return False
         return True
@@ -242,6 +248,17 @@ def _is_death(error: BaseException | None) -> bool:
 _LOCK = threading.Lock()
 
 
+@lru_cache(maxsize=1000)  # the last runs
+def _answer(run: str) -> "Future[str]":
+    return Future()
+
+
+def _answer_to(run: str) -> "Future[str]":
+    """Return what this worker answers, or will, when a run asks what keeps it from taking part."""
+    with _LOCK:  # or each of two threads would make its own
+        return _answer(run)
+
+
 @lru_cache(maxsize=8)  # the last runs
 def _set_up(run: str, threads: int) -> tuple[threading.Event, ThreadPoolExecutor | None]:
     prepare_worker()
@@ -250,7 +267,7 @@ def _set_up(run: str, threads: int) -> tuple[threading.Event, ThreadPoolExecutor
 
 def _run_here(run: str, threads: int) -> tuple[threading.Event, ThreadPoolExecutor | None]:
     """Return what stops a run on this worker, and the threads of its tasks; at first, set the worker up."""
-    with _LOCK:  # or each of two threads would make its own
+    with _LOCK:
         return _set_up(run, threads)
 
 
@@ -258,10 +275,14 @@ def _stop_run(run: str, threads: int) -> None:
     _run_here(run, threads)[0].set()
 
 
-def _do_chunk(version: str, run: str, told: bytes) -> bytes:
+def _do_chunk(run: str, told: bytes) -> bytes:
     """Do a chunk on a worker, which begins another one while the last tasks wait for the network."""
-    if version != __version__:
-        raise WorkerError(_other_version(version))
+    try:
+        problem = _answer_to(run).result(_ASKED_S)
+    except FutureTimeoutError:  # it was started anew under the address of another one
+        raise TimeoutError("nobody asked the worker what it sees") from None
+    if problem:
+        raise WorkerError(problem)
     job, tasks = pickle.loads(told)  # noqa: S301 (as Dask does)
     stopped, pool = _run_here(run, job.threads)
     chunk: Chunk[Any, Any] = Chunk(job, tasks, stopped, pool)
@@ -271,10 +292,6 @@ def _do_chunk(version: str, run: str, told: bytes) -> bytes:
         pool.submit(lambda: None).result()  # which begins after all the tasks
         secede()
     return pickle.dumps(chunk.done(), pickle.HIGHEST_PROTOCOL)
-
-
-def _other_version(version: str) -> str:
-    return f"has rollcli {__version__}, this is {version}"
 
 
 def scheduler_address(given: str) -> str:
@@ -329,7 +346,9 @@ def _connect(address: str) -> Any:
     return client
 
 
-def _problems(client: Any, asked: Workers, workers: Collection[str]) -> tuple[dict[str, str], set[str]]:
+def _problems(
+    client: Any, run: str, asked: Workers, workers: Collection[str]
+) -> tuple[dict[str, str], set[str]]:
     """Ask workers whether they have this rollcli and see the files and folders that this process sees.
 
     Returns
@@ -346,7 +365,8 @@ def _problems(client: Any, asked: Workers, workers: Collection[str]) -> tuple[di
     try:
         for mark in marks:
             write_atomic(mark, b"")
-        answers = client.run(probe, __version__, sizes, marks, workers=list(workers), on_error="return")
+        question = (probe, __version__, sizes, marks, run)
+        answers = client.run(*question, workers=list(workers), on_error="return")
     finally:
         for mark in marks:
             with contextlib.suppress(OutputError):  # the one that could not be made
@@ -361,10 +381,20 @@ def _problems(client: Any, asked: Workers, workers: Collection[str]) -> tuple[di
     return problems, silent
 
 
-def probe(version: str, sizes: dict[str, int], marks: list[str]) -> str:
-    """Say what keeps this worker from running tasks; empty when nothing does. Runs on the worker."""
+def probe(version: str, sizes: dict[str, int], marks: list[str], run: str) -> str:
+    """Say what keeps this worker from running the tasks of a run; empty when nothing does.
+
+    Runs on the worker, whose chunks wait for the answer.
+    """
+    problem = _problem(version, sizes, marks)
+    if not (answer := _answer_to(run)).done():
+        answer.set_result(problem)
+    return problem
+
+
+def _problem(version: str, sizes: dict[str, int], marks: list[str]) -> str:
     if version != __version__:
-        return _other_version(version)
+        return f"has rollcli {__version__}, this is {version}"
     for path, size in sizes.items():
         if not is_file(path) or Path(path).stat().st_size != size:
             return f"does not see {path}; inputs must lie on storage that the workers share"

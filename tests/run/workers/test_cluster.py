@@ -203,12 +203,11 @@ def test_a_scheduler_that_is_lost_ends_the_run_which_goes_on_without_it(local, f
     assert_is_that_of_a_local_run(far, local)
 
 
-# a worker of another version, which notes what it does
+# a worker that notes what it does
 ODD = """
 from pathlib import Path
 import rollcli
 from rollcli.run.workers import cluster
-rollcli.__version__ = cluster.__version__ = "0.0"
 from rollcli.run import frame_task
 run_frame = frame_task.run_frame
 def noted(*given):
@@ -218,14 +217,21 @@ frame_task.run_frame = noted
 """
 
 
-def test_a_worker_of_another_version_that_joins_later_gets_no_work_also_when_all_others_are_new(
-    local, far, tmp_path, cluster_here, scheduler, workers
+@pytest.mark.parametrize(
+    ("oddity", "problem"),
+    [
+        ('cluster.__version__ = "0.0"', f"has rollcli 0.0, this is {__version__}"),
+        ("cluster.is_file = lambda path: False", "inputs must lie on storage that the workers share"),
+    ],
+)
+def test_a_worker_that_joins_later_and_cannot_take_part_gets_no_work_also_when_all_others_are_new(
+    local, far, tmp_path, cluster_here, scheduler, workers, oddity, problem
 ):
     import distributed
 
     odd = tmp_path / "odd"
     odd.mkdir()
-    (odd / "preload.py").write_text(ODD)
+    (odd / "preload.py").write_text(ODD + oddity)
     for number in range(400):  # so many that the worker is there before the end
         shutil.copy(local / "maps" / "frame0.png", far / "maps" / f"more{number:03}.png")
     run = start(far, scheduler)
@@ -248,7 +254,7 @@ def test_a_worker_of_another_version_that_joins_later_gets_no_work_also_when_all
     assert run.returncode == 3, err
     assert "gets no work" not in err
     assert said.startswith("rollcli: worker tcp://")
-    assert said.endswith(f": has rollcli 0.0, this is {__version__}; it gets no work\n")
+    assert said.endswith(f"{problem}; it gets no work\n")
     assert not (odd / "worked").exists()
     assert len((far / "rolls.csv").read_text().splitlines()) == 1 + FRAMES + 400
 
@@ -256,13 +262,14 @@ def test_a_worker_of_another_version_that_joins_later_gets_no_work_also_when_all
 def test_a_worker_that_has_no_such_program_or_files_or_may_not_write_is_named(tmp_path, monkeypatch):
     there = tmp_path / "a.png"
     there.write_bytes(b"123")
-    assert probe(__version__, {str(there): 3}, [str(tmp_path / "a.png")]) == ""
-    assert "this is 0.0" in probe("0.0", {}, [])
-    assert f"does not see {tmp_path / 'b.png'}" in probe(__version__, {str(tmp_path / "b.png"): 3}, [])
-    assert "does not see" in probe(__version__, {str(there): 4}, [])
-    assert "what they write must lie on storage" in probe(__version__, {}, [str(tmp_path / "v" / "mark")])
+    assert probe(__version__, {str(there): 3}, [str(tmp_path / "a.png")], "run") == ""
+    assert "this is 0.0" in probe("0.0", {}, [], "run")
+    assert f"does not see {tmp_path / 'b.png'}" in probe(__version__, {str(tmp_path / "b.png"): 3}, [], "run")
+    assert "does not see" in probe(__version__, {str(there): 4}, [], "run")
+    mark = str(tmp_path / "v" / "mark")
+    assert "what they write must lie on storage" in probe(__version__, {}, [mark], "run")
     monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)
-    assert probe(__version__, {}, [str(there)]) == f"cannot write to {tmp_path}"
+    assert probe(__version__, {}, [str(there)], "run") == f"cannot write to {tmp_path}"
 
 
 def estimate_here(address, cwd, *more):
