@@ -385,10 +385,13 @@ def pieces_of(path: str) -> Iterator[tuple[str, bytes]]:
         yield from read_parts(path, parts)
     elif path == STREAM or not Path(path).is_dir():
         try:
-            yield path, read_named(path)
+            data = read_named(path)
         except InputError as error:
             if error.code != NO_OBJECT or read_run(path) is None:
                 raise
+            return
+        if data or read_run(path) is None:  # JSON Lines has no header
+            yield path, data
     elif read_run(path) is None:  # else a run has no rows yet, or its shard has none
         raise InputError(f"{path}: is a folder without parts of a result, such as part-00000.parquet")
 

@@ -270,7 +270,8 @@ def _parsed(data: bytes, plan: Plan) -> tuple[KeptRows, bytes, bytes]:
     try:
         if update:
             data, kept.gone = arranged(data, plan)
-        kept.take(results.parse_rows(data, plan.output), inputs)
+        if data:  # JSON Lines has no header: nothing is left where all frames are gone
+            kept.take(results.parse_rows(data, plan.output), inputs)
     except InputError as error:
         raise not_resumable(plan.output, str(error)) from error
     lines = row_lines(io.BytesIO(data), plan.format)

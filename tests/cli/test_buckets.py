@@ -58,9 +58,10 @@ def test_images_of_kept_rows_that_are_missing_are_made_again(bucket, tmp_path, p
     assert objects_below(level) == images
 
 
-@pytest.mark.parametrize("form", ["csv", "parquet"])
+@pytest.mark.parametrize("form", ["csv", "parquet", "jsonl"])
 def test_a_shard_without_frames_is_a_result_without_rows(bucket, tmp_path, form):
-    results = [f"{bucket}/{shard}.{form}" for shard in range(1, 7)]
+    place = str(tmp_path) if form == "jsonl" else bucket  # a file of no bytes
+    results = [f"{place}/{shard}.{form}" for shard in range(1, 7)]
     for shard, result in enumerate(results, 1):
         line = ("estimate", f"{bucket}/maps", "-o", result, "--shard", f"{shard}/6", "-q")
         assert rollcli(*line, cwd=tmp_path).status == 0

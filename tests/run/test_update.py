@@ -142,14 +142,16 @@ def test_objects_are_compared_by_their_tags(tmp_path, bucket, monkeypatch):
     assert read == [f"{folder}/frame2.png"]
 
 
-def test_an_update_that_keeps_no_row_records_how_the_maps_of_now_were_read(tmp_path):
+@pytest.mark.parametrize("result", ["rolls.csv", "rolls.jsonl"])
+def test_an_update_that_keeps_no_row_records_how_the_maps_of_now_were_read(tmp_path, result):
     """Else `rig` would ask of maps that were exported anew whether they are one rig's."""
-    folder = estimated(tmp_path, 2)
-    for path in sorted((folder / "maps").iterdir()):
+    write_maps(tmp_path / "maps", 2)
+    estimate(tmp_path, result=result)
+    for path in sorted((tmp_path / "maps").iterdir()):
         np.save(path.with_suffix(".npy"), road_map(0.1))
         path.unlink()
-    estimate(folder, "--update")
-    assert json.loads((folder / "rolls.csv.run.json").read_text())["encoding"] == ["px"]
+    estimate(tmp_path, "--update", result=result)
+    assert json.loads((tmp_path / f"{result}.run.json").read_text())["encoding"] == ["px"]
 
 
 @pytest.mark.parametrize("result", mostly_slow(["rolls.csv", "rolls.parquet"], "rolls.csv"))
