@@ -564,9 +564,10 @@ def _differences(kept: KeptRows, was: Mapping[str, Any] | None, record: RunRecor
     if grown:  # what has been added sorts last, or the names differ
         frames = frames[:count]
         now = RunRecord(replace(plan, frames=frames)).fixed
-    if was.get("calibration") != json.loads(json.dumps(now.get("calibration"))):
-        yield "the calibration differs"
     updates = not plan.options.result.in_parts
+    again = "; --update does again what has changed" if updates else ""
+    if was.get("calibration") != json.loads(json.dumps(now.get("calibration"))):
+        yield f"the calibration differs{again}"
     hint = "; --update leaves out the rows of frames that are gone" if updates else ""
     if grown:
         hint = f"; new frames must sort last{', or be added by --update' if updates else ''}"
@@ -580,7 +581,7 @@ def _differences(kept: KeptRows, was: Mapping[str, Any] | None, record: RunRecor
     if inputs_was.get("names") != inputs_now["names"]:
         yield f"the names of the inputs differ{hint}"
     if kept.changed:
-        how = "; --update does again what has changed" if updates else ""
+        how = again
         if {frames[at].file for at in kept.errors}.issuperset(kept.changed):
             how = "; --retry-failed does again what has failed"
         also = {"right image": plan.options.paired, "mask": plan.options.region.mask}
