@@ -8,8 +8,6 @@ __version__ = "0.1.0"
 
 TYPE_CHECKING = False  # as type checkers know it, without loading typing
 if TYPE_CHECKING:
-    from typing import Any
-
     from rollcli.errors import EstimationError as EstimationError
     from rollcli.errors import InputError as InputError
     from rollcli.errors import RollcliError as RollcliError
@@ -30,33 +28,31 @@ if TYPE_CHECKING:
     from rollcli.run.library import open_recording as open_recording
     from rollcli.stereo.match import compute_disparity as compute_disparity
     from rollcli.stereo.options import StereoOptions as StereoOptions
+else:  # a checker is told by the imports above which names there are
+    _NAMES = {
+        "rollcli.errors": "EstimationError InputError RollcliError UsageError",
+        "rollcli.estimator.estimate": "RollEstimate",
+        "rollcli.estimator.interval": "Tangent",
+        "rollcli.files.encodings": "read_disparity",
+        "rollcli.pictures.derotate": "derotate",
+        "rollcli.pictures.heights": "height_map",
+        "rollcli.pictures.vdisparity": "VDisparity v_disparity",
+        "rollcli.rig.calibration": "Calibration",
+        "rollcli.rig.drive.assess": "RigAssessment assess_rig",
+        "rollcli.run.find": "read_calibration",
+        "rollcli.run.library": "estimate_pair estimate_roll open_recording",
+        "rollcli.stereo.match": "compute_disparity",
+        "rollcli.stereo.options": "StereoOptions",
+    }
+    _HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
+    __all__ = ["__version__", *sorted(_HOMES)]
 
-_NAMES = {
-    "rollcli.errors": "EstimationError InputError RollcliError UsageError",
-    "rollcli.estimator.estimate": "RollEstimate",
-    "rollcli.estimator.interval": "Tangent",
-    "rollcli.files.encodings": "read_disparity",
-    "rollcli.pictures.derotate": "derotate",
-    "rollcli.pictures.heights": "height_map",
-    "rollcli.pictures.vdisparity": "VDisparity v_disparity",
-    "rollcli.rig.calibration": "Calibration",
-    "rollcli.rig.drive.assess": "RigAssessment assess_rig",
-    "rollcli.run.find": "read_calibration",
-    "rollcli.run.library": "estimate_pair estimate_roll open_recording",
-    "rollcli.stereo.match": "compute_disparity",
-    "rollcli.stereo.options": "StereoOptions",
-}
-_HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
-__all__ = ["__version__", *sorted(_HOMES)]
+    def __getattr__(name: str) -> object:
+        if name in _HOMES:
+            from importlib import import_module
 
+            return getattr(import_module(_HOMES[name]), name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
-def __getattr__(name: str) -> "Any":
-    if name in _HOMES:
-        from importlib import import_module
-
-        return getattr(import_module(_HOMES[name]), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+    def __dir__() -> list[str]:
+        return sorted(__all__)

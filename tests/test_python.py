@@ -49,10 +49,15 @@ def test_a_client_that_uses_every_public_name_runs(tmp_path):
 def test_that_client_type_checks_against_an_editable_install(tmp_path):
     pytest.importorskip("mypy", reason="mypy, of what tests need, is not here")
     client = tmp_path / "client.py"
-    client.write_text((ROOT / "tests" / "typed_client.py").read_text("utf-8"), "utf-8")
+    source = (ROOT / "tests" / "typed_client.py").read_text("utf-8")
     python = _editable(tmp_path / "environment")
-    for text, status in (("", 0), ("\nrollcli.derotate(1, rol=2)\n", 1)):
-        client.write_text(client.read_text("utf-8") + text, "utf-8")
+    for text, status in (
+        ("", 0),
+        ("from rollcli import *\nv_disparity(height_map(road(0.1), estimate_roll(road(0.1))))", 0),
+        ("rollcli.derotate(1, rol=2)", 1),
+        ("rollcli.estimate_rol", 1),
+    ):
+        client.write_text(f"{source}\n{text}\n", "utf-8")
         line = [sys.executable, "-m", "mypy", "--strict", "--no-incremental", "--python-executable", python]
         done = ended([*line, "client.py"], tmp_path, env=None)
         assert done.returncode == status, done.stdout + done.stderr
