@@ -74,7 +74,8 @@ def _done(frame: Frame, options: FramesOptions) -> tuple[FrameResult, dict[str, 
     source = read_source(frame, options)
     if isinstance(options, ConvertOptions):
         files, warnings = _MAKERS[type(options)](source, frame, options, _usual_paths(frame, options))
-        row = Row(frame.file, frame.right_file, "ok", **source.alignment)
+        height, width = source.disparity.shape
+        row = Row(frame.file, frame.right_file, "ok", width=width, height=height, **source.alignment)
         warnings = {**source.doubts, **warnings}
     else:
         row, files, warnings = _estimated(frame, source, options)

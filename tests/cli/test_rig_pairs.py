@@ -168,6 +168,13 @@ def test_a_pair_that_contradicts_the_correction_is_suspect(pairs):
     assert all("do not lie as the correction says" in row["message"] for row in rows)
 
 
+def test_maps_of_pairs_that_lie_as_the_correction_says_ask_for_nothing(pairs):
+    first = ("--left", "left/frame_000[12].png", "--right", "off/frame_000[12].png")
+    done = rollcli("disparity", *first, "--align", "use.json", "-o", "maps_of_off", cwd=pairs)
+    assert done.status == 0
+    assert "recalibrate" not in done.err
+
+
 def test_a_drive_says_how_its_pairs_lie_and_not_what_an_earlier_correction_says(pairs):
     earlier = json.loads((pairs / "use.json").read_text())
     earlier["right_clockwise_deg"] -= 0.05
