@@ -72,7 +72,7 @@ def v_disparity(
         most = f"at most {_MOST_BINS} bins"
         raise UsageError(f"bins {bins} and max-disparity {max_disparity}: both must be positive, {most}")
     if bins is None:
-        bins = min(math.ceil(max_disparity) if whole else max(256, math.ceil(4 * max_disparity)), _MAX_BINS)
+        bins = math.ceil(min(max_disparity if whole else max(256, 4 * max_disparity), _MAX_BINS))
     return _histogram(blocks, bins, max_disparity)
 
 

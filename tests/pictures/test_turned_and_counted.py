@@ -85,6 +85,7 @@ def test_disparities_are_counted_in_the_bins_that_hold_them(monkeypatch, block):
             expected[row, min(int(values[row, column] / top * bins), bins - 1)] += 1
         np.testing.assert_array_equal(counts, expected)
     assert v_disparity(values).max_disparity == 71
+    assert v_disparity(values, max_disparity=1e308).counts.shape == (23, 1024)
     assert [v_disparity(each).counts.shape for each in (values, np.rint(values))] == [(23, 4 * 71), (23, 71)]
     assert (v_disparity([range(22)]).counts == [[0] + 21 * [1]]).all()  # where 15 / 22 * 22 is less than 15
 

@@ -117,7 +117,7 @@ def _why_no_plane(sample: Sample, max_roll: float) -> str:
         return "no road: nowhere does the disparity grow downward, as it does on a road"
     return (
         "no road: what grows downward in the map does so by hardly more than its noise, or is rolled by more "
-        f"than {math.degrees(max_roll):.0f} degrees"
+        f"than {math.degrees(max_roll):.3g} degrees"
     )
 
 

@@ -125,12 +125,13 @@ def test_any_roll_within_the_bound_is_found(roll_deg):
     assert error_deg(disparity, spec.roll, max_roll=math.radians(89)) < 0.005
 
 
-def test_a_road_rolled_beyond_the_bound_is_no_road():
+@pytest.mark.parametrize("most_deg", [20, 0.4])
+def test_a_road_rolled_beyond_the_bound_is_no_road(most_deg):
     spec = FrameSpec(scene="bare", roll=math.radians(30), pitch=0.05, seed=3)
     disparity, _ = true_disparity(spec)
 
-    with pytest.raises(EstimationError, match="no road"):
-        estimate_roll(disparity, Request(max_roll=math.radians(20)))
+    with pytest.raises(EstimationError, match=f"^no road: .* rolled by more than {most_deg} degrees$"):
+        estimate_roll(disparity, Request(max_roll=math.radians(most_deg)))
 
 
 @functools.cache
