@@ -29,7 +29,7 @@ class RollEstimate:
     status : str
         "ok", or "suspect": `message` says why the angle is doubtful.
     message : str
-        Reasons, joined by "; "; empty when ok.
+        Reasons, joined by "; ", and how a pair without enough road was matched; else empty.
     method : str
     iterations : int
     converged : bool

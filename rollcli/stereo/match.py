@@ -219,7 +219,8 @@ def compute_disparity(
     Notes
     -----
     Everything is matched by OpenCV's SGBM. Where a road is found and no option says how to match, its
-    disparities are those of a match along its plane, as in `rollcli.estimate_pair`.
+    disparities are those of a match along its plane, as in `rollcli.estimate_pair`, whose interval
+    alone knows what levelling left uncertain: an array does not carry it.
 
     Examples
     --------
