@@ -107,10 +107,14 @@ class ClusterExecutor(Generic[Task, Result]):
     @property
     def workers(self) -> int:
         """The number of threads of the workers that take part; it is asked for once a second."""
+        self._look()
+        return max(sum(self._threads_of.values()), 1)
+
+    def _look(self) -> None:
+        """Take in workers that have joined, once a second."""
         if time.monotonic() - self._looked > _LOOK_S:
             self.take_in_workers()
             self._looked = time.monotonic()
-        return max(sum(self._threads_of.values()), 1)
 
     def take_in_workers(self, *, anew: bool = False) -> None:
         """Take in workers that have joined, and say which of them cannot take part; anew: ask all again."""
@@ -148,7 +152,7 @@ class ClusterExecutor(Generic[Task, Result]):
     def wait(self, future: "ClusterFuture[Task, Result]") -> None:
         """Wait until a chunk is done, or for a fifth of a second."""
         self.check_connection()
-        _ = self.workers  # those that have joined are asked: the chunk may wait for that
+        self._look()  # the chunk may wait until its worker is asked
         future.settled.wait(_POLL_S)
 
     def retry(self, chunk: Sequence[Task]) -> Done[Result]:
