@@ -65,7 +65,8 @@ def v_disparity(
     if values.ndim != 2 or values.dtype.kind not in "fiub":
         raise UsageError(f"a disparity map is 2-D and real, not of shape {values.shape} and {values.dtype}")
     blocks = [values[rows] for rows in strips(len(values), _BLOCK // max(1, values.shape[1]))]
-    whole = all(bool((pixels == np.rint(pixels)).all()) for pixels in map(_pixels, blocks))
+    asked = bins is None or max_disparity is None  # else nothing depends on it
+    whole = asked and all(bool((pixels == np.rint(pixels)).all()) for pixels in map(_pixels, blocks))
     if max_disparity is None:
         max_disparity = _end_of(blocks, 1 if whole else 4)
     if not 0 < max_disparity < math.inf or not (bins is None or 0 < bins <= _MOST_BINS):
