@@ -137,7 +137,7 @@ def lane_points() -> tuple[Array, Array, Array]:
     return lateral, z, 1 / z
 
 
-def lane_plane(relief: Relief) -> list[float]:
+def lane_parabola(relief: Relief) -> list[float]:
     """Return height, slope to the right, slope ahead and half the curvature of what fits the lane, metres.
 
     Of its middle part, 1.2 m to each side and up to 20 m ahead.
@@ -196,7 +196,7 @@ def draw_relief(
     Returns
     -------
     Relief
-        At a height of 0 below the rig, on the parabola that fits the lane ahead (`lane_plane`).
+        At a height of 0 below the rig, on the parabola that fits the lane ahead (`lane_parabola`).
     """
     scale = 2.0 ** ROUGHNESS.index(roughness)  # of heights, whose squares are four times as large
     lateral, z = LEFT + STEP * np.arange(_ACROSS), _START + STEP * np.arange(_ALONG)
@@ -210,7 +210,7 @@ def draw_relief(
         across = (lateral >= x) & (lateral < min(x + wide, edges[1]))
         heights[np.ix_((z >= ahead) & (z < ahead + long), across)] += scale * _SUNKEN * raised
     relief = Relief(heights)
-    heights -= lane_plane(relief)[0]
+    heights -= lane_parabola(relief)[0]
     return relief
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from rollcli.simulate.materials import WARM, Asphalt, Facade, Leaves, Mark, Patch, Paving, Plain, Tint
 from rollcli.simulate.options import GUTTER_WIDTH
-from rollcli.simulate.relief import Array, Relief, draw_relief, lane_plane
+from rollcli.simulate.relief import Array, Relief, draw_relief, lane_parabola
 from rollcli.simulate.scene import FAR, Post, Scene, Solid, TreeCrown, draw_offset
 from rollcli.simulate.spec import FrameSpec, Stream
 from rollcli.simulate.surfaces import Backdrop, Course, Ground, Wall
@@ -109,8 +109,8 @@ class Carriageway:
 
     @property
     def fit_ahead(self) -> list[float]:
-        """What `lane_plane` fits to the unevenness of the lane ahead, metres; zeros on a smooth road."""
-        return [0.0] * 4 if self.relief is None else lane_plane(self.relief)
+        """What `lane_parabola` fits to the unevenness of the lane ahead, metres; zeros on a smooth road."""
+        return [0.0] * 4 if self.relief is None else lane_parabola(self.relief)
 
     @property
     def curvature_ahead(self) -> float:
