@@ -251,7 +251,7 @@ def match_pair(
         See `compute_disparity`.
     find_road : callable, optional
         Finds the road's plane in a smaller map of the pair. The road is then matched along it, and what lies
-        beside and above it at a third of the size; without it all is matched at full size.
+        beside and above it is that of the smaller map; without it all is matched at full size.
     rig : Calibration, optional
         Of the views as they are given: a yaw or a pitch of the right camera turns its columns about the
         principal point.
