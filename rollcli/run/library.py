@@ -288,7 +288,7 @@ def open_recording(
     ...
     rollcli.errors.UsageError: rolls.csv: is no .bag, .db3, .mcap or rosbag2 folder
     """
-    from rollcli.files.recordings.frames import frames_of_bag
+    from rollcli.files.recordings.frames import frames_of_bag, readable_bags
 
     name = os.fspath(path)
     if (encoding != "auto" or scale is not None) and (left_topic or is_video(name)):
@@ -308,8 +308,9 @@ def open_recording(
             raise UsageError(f"a sync_tolerance of {sync_tolerance} s: give 0 or more")
         if (left_topic is None) is not (right_topic is None):
             raise UsageError("left_topic and right_topic are given together")
+        ((_, files),), rests = readable_bags([(name, files)])
         found = frames_of_bag(files, name, topic, left_topic, right_topic, 1000 * sync_tolerance)
-        frames, camera = found.frames, found.calibration
+        frames, camera = [*found.frames, *((rest, None) for rest in rests)], found.calibration
     for one, other in frames:
         if other is None:
             stored = read_stored(one.location, one.name, rgb=encoding == Encoding.FOUNDATIONSTEREO)

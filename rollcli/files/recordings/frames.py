@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from operator import attrgetter
+from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
@@ -54,7 +55,43 @@ class _Found:
     frames: dict[str, list[Input]]
     cameras: dict[str, CameraInfo]
     places: dict[tuple[str, str], str]
-    broken: list[tuple[str, str]]
+    broken: list[Input]
+
+
+Bags = Sequence[tuple[str, list[str]]]  # each by its name, with its files
+
+
+def readable_bags(bags: Bags) -> tuple[Bags, list[Input]]:
+    """Leave out the files that cannot be opened, such as one that was begun as the power failed.
+
+    Returns
+    -------
+    sequence of (str, list of str)
+        The bags that have other files, with these.
+    list of Input
+        Of each file left out a frame, which fails and says why.
+
+    Raises
+    ------
+    UsageError
+        No file can be opened.
+    """
+    faults: dict[str, InputError] = {}
+    for path in (each for _, files in bags for each in files):
+        try:
+            opened(path)
+        except InputError as error:
+            faults[path] = error
+    kept = ((name, [each for each in files if each not in faults]) for name, files in bags)
+    readable = [each for each in kept if each[1]]
+    if not readable:
+        raise UsageError(str(next(iter(faults.values()))))
+    return readable, [_rest(path) for path in faults]
+
+
+def _rest(path: str) -> Input:
+    """Return the frame that stands for what is broken in a file: it fails and says why."""
+    return Input(f"{path}#rest", f"{Path(path).stem}_rest.npy")
 
 
 def frames_of_bag(
@@ -92,9 +129,7 @@ def frames_of_bag(
     if not bag.frames and not found.broken:
         raise UsageError(f"{name}: has no messages of {' and '.join(chosen)}")
     of_pairs = bool(views and bag.frames)
-    for path, stem in found.broken:  # one frame more, which fails and says so
-        rest = Input(f"{path}#rest", f"{stem}_rest.npy")
-        bag.frames.append((rest, rest if of_pairs else None))
+    bag.frames += [(rest, rest if of_pairs else None) for rest in found.broken]
     return bag
 
 
@@ -291,7 +326,7 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
     endings: dict[str, str] = {}
     for path in files:
         bag = opened(path)
-        stem = os.path.splitext(os.path.basename(path))[0]  # noqa: PTH119, PTH122
+        stem = Path(path).stem
         for message in bag.messages({*by_name, *infos}, by_name):
             place = "{}+{}".format(*message.place)
             if (topic := by_name.get(message.topic)) is None:
@@ -314,7 +349,7 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
             relative = f"{stem}_{stamp}{again.replace('.', '_')}{ending}"
             frames[topic.name].append(Input(f"{name}{again}#@{place}", relative, stamp))
         if bag.broken:
-            broken.append((path, stem))
+            broken.append(_rest(path))
     for each in frames.values():  # a recorder writes messages as they come in
         each.sort(key=attrgetter("stamp"))
     return _Found(frames, cameras, places, broken)

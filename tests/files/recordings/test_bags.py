@@ -347,6 +347,16 @@ def test_a_bag_of_several_files_is_one_drive(tmp_path):
     said = rollcli("disparity", "split", *given, "-o", "maps", cwd=tmp_path).err
     assert "split/split_1.mcap: has no /left/camera_info: its raw views are taken as they are" in said
     assert "split_0.mcap: has no" not in said
+    (folder / "split_2.mcap").touch()  # begun as the power failed
+    for path in ("split", "split/*.mcap"):
+        cut = rollcli("estimate", path, "--topic", "/disparity", cwd=tmp_path, status=3)
+        *whole, last = rows(cut.out)
+        assert [row["file"] for row in whole] == names
+        assert (last["file"], last["message"]) == ("split/split_2.mcap#rest", "split/split_2.mcap: is empty")
+    read = package.open_recording(folder, topic="/disparity")
+    assert [next(read).name for _ in names] == [f"{folder.parent}/{each}" for each in names]
+    with pytest.raises(InputError, match=r"split_2.mcap: is empty"):
+        next(read)
     (folder / "split_1.mcap").rename(folder / "split_1.mcap.zstd")
     refusal = rollcli("estimate", "split", cwd=tmp_path).refused()
     assert "split/split_1.mcap.zstd: is compressed as a whole; unpack it by zstd -d" in refusal
