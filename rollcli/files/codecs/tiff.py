@@ -155,7 +155,7 @@ def _decoded_parts(page: Any, shape: tuple[int, ...], part: tuple[int, int], dat
 
 
 SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-_RGB, _PALETTE = 2, 3
+_WHITE_IS_ZERO, _RGB, _PALETTE = 0, 2, 3
 _CHUNKY = 1
 _LARGE_TILE = 2**22  # pixels; a small image may lie in one large tile
 _NOT_A_PAGE_OF_ITS_OWN = 0b101  # a reduced copy, or a mask, of another page
@@ -172,6 +172,8 @@ def decode_tiff(data: bytes) -> Stored:
             what = "a palette" if page.photometric == _PALETTE else f"{page.samplesperpixel} channels"
             raise InputError(f"is a colour image ({what}); {COLOUR_REMEDY}")
         values = native(_pixels(page, data)[..., 0])
+        if values.dtype.kind == "b" and page.photometric == _WHITE_IS_ZERO:  # bits are a mask, as it is shown
+            values = ~values
         return Stored(values, "tiff", nodata=_nodata(page), note=_note(file), text=page.description)
 
 

@@ -4,6 +4,7 @@ import re
 import struct
 from importlib.util import find_spec
 
+import cv2
 import numpy as np
 import pytest
 
@@ -96,6 +97,13 @@ def test_deflated_bits_are_held_against_their_checksum_too():
     start, end = data_of(whole)
     for bit in range(8 * start, 8 * end, 5):
         assert picture_or_mask(flipped(whole, bit)) in (None, expected)
+
+
+@pytest.mark.parametrize("zero_is", ["minisblack", "miniswhite"])
+def test_a_mask_of_bits_is_what_is_shown_of_it(zero_is):
+    file = tiff_by_tifffile(VALUES.mean() < VALUES, photometric=zero_is)
+    shown = cv2.imdecode(np.frombuffer(file, np.uint8), cv2.IMREAD_GRAYSCALE)
+    np.testing.assert_array_equal(decode_mask(file, "x"), shown > 0)
 
 
 def picture_or_mask(data):
