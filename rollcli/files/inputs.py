@@ -175,11 +175,9 @@ def _listed_in(name: str) -> Iterator[str]:
     """
     with as_usage():
         data = as_utf8(read_named(name, MOST_LISTED, _LIST), name)
-    if name == STREAM and data.startswith(_NO_TEXT):
-        raise UsageError(
-            "-: stands for a list of files on stdin, one a line; what came is an image or an archive: name "
-            "its file in place of -"
-        )
+    if data.startswith(_NO_TEXT):
+        what = "what came is an image or an archive: name its file as an input"
+        raise UsageError(f"{name}: stands for a list of files, one a line; {what}")
     # one after the other: all at once, a list of line ends alone would take ten times its memory
     if b"\0" in data:
         return (os.fsdecode(line[0]) for line in re.finditer(rb"[^\0]+", data))

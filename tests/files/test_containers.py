@@ -54,11 +54,13 @@ def test_a_file_may_have_a_number_sign_in_its_name(tmp_path):
     assert shown("run.tar#a.png#@512+9") == "run.tar#a.png"
 
 
-def test_an_image_on_stdin_is_told_what_a_dash_means(tmp_path):
+@pytest.mark.parametrize("given", [["-"], ["--files-from", "maps/frame0.png"]])
+def test_an_image_in_place_of_a_list_is_told_what_a_list_is(tmp_path, given):
     write_maps(tmp_path / "maps", 1)
     data = (tmp_path / "maps/frame0.png").read_bytes()
-    done = ended(command("estimate", "-"), tmp_path, input=data, text=False)
-    assert (done.returncode, b"-: stands for a list of files on stdin" in done.stderr) == (2, True)
+    done = ended(command("estimate", *given), tmp_path, input=data, text=False)
+    said = f"rollcli: {given[-1]}: stands for a list of files, one a line".encode()
+    assert (done.returncode, done.stderr.startswith(said)) == (2, True)
 
 
 def test_a_tar_gives_what_unpacking_it_would(tmp_path):
