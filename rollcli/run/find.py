@@ -406,9 +406,8 @@ def _behind(name: str) -> list[str]:
 def _in_bags(bags: _Bags, options: FramesOptions) -> Iterator[_Named]:
     from rollcli.files.recordings.frames import frames_of_bag, readable_bags
 
-    readable, rests = readable_bags(bags)
-    asked = options.inputs.topic, *options.topics
-    for bag in [frames_of_bag(files, name, *asked) for name, files in readable]:
+    bags, rests = readable_bags(bags)
+    for bag in [frames_of_bag(files, name, options.inputs.topic, *options.topics) for name, files in bags]:
         known, given = bag.calibration, options.calibration
         options.running.note(*bag.notes, *([] if given.given else bag.uncalibrated))
         known = None if known is None or given.calib else with_numbers(known, given)

@@ -58,7 +58,7 @@ class _Found:
     broken: list[Input]
 
 
-Bags = Sequence[tuple[str, list[str]]]  # each by its name, with its files
+Bags = list[tuple[str, list[str]]]  # each by its name, with its files
 
 
 def readable_bags(bags: Bags) -> tuple[Bags, list[Input]]:
@@ -66,7 +66,7 @@ def readable_bags(bags: Bags) -> tuple[Bags, list[Input]]:
 
     Returns
     -------
-    sequence of (str, list of str)
+    list of (str, list of str)
         The bags that have other files, with these.
     list of Input
         Of each file left out a frame, which fails and says why.
