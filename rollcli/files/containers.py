@@ -64,7 +64,7 @@ def frame_name(name: str) -> str:
         stem = posixpath.splitext(posixpath.basename(found[1].replace(os.sep, "/")))[0]
         ending = "png" if "/compressed" in found[2] else "npy"
         return f"{stem}_{found[2].rpartition('@')[2].replace('.', '_')}.{ending}"
-    return found[2]
+    return found[2].replace("\\", "/")  # as programs for Windows write it in archives
 
 
 def is_archive(location: str) -> bool:
@@ -144,8 +144,9 @@ def members(path: str) -> Iterator[tuple[str, str]]:
     else:
         found = ((each.filename, "") for each in _zip(path).infolist() if not each.is_dir())
     for name, position in found:
-        if not any(part.startswith((".", "__MACOSX")) and part.strip(".") for part in name.split("/")):
-            yield f"{path}#{name}{position}", name.removeprefix("./")
+        below = name.replace("\\", "/").removeprefix("./")
+        if not any(part.startswith((".", "__MACOSX")) and part.strip(".") for part in below.split("/")):
+            yield f"{path}#{name}{position}", below
 
 
 def _tar_members(path: str) -> Iterator[tuple[str, str]]:

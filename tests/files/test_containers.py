@@ -25,13 +25,16 @@ def test_workers_that_were_forked_from_one_process_read_an_archive_each_for_itse
     assert contents(tmp_path / "six") == contents(tmp_path / "one")
 
 
-def test_a_member_cannot_name_a_file_elsewhere(tmp_path):
-    write_maps(tmp_path / "maps", 1)
+@pytest.mark.parametrize("slash", ["/", "\\"])
+def test_a_member_cannot_name_a_file_elsewhere(tmp_path, slash):
+    write_maps(tmp_path / "maps", 2)
     with zipfile.ZipFile(tmp_path / "bad.zip", "w") as file:
-        file.write(tmp_path / "maps/frame0.png", "../../outside.png")
-    done = rollcli("estimate", "bad.zip", "--derotated", "in/side", cwd=tmp_path)
-    assert (done.status, rows_of(done.out)[0]["status"]) == (3, "error")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["bad.zip", "maps"]
+        file.write(tmp_path / "maps/frame0.png", "../../frame0.png".replace("/", slash))
+        file.write(tmp_path / "maps/frame1.png", "run/frame1.png".replace("/", slash))
+    done = rollcli("estimate", "bad.zip", "--mask", "maps", "--derotated", "in/side", cwd=tmp_path)
+    assert (done.status, [row["status"] for row in rows_of(done.out)]) == (3, ["error", "ok"])
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bad.zip", "in", "maps"]
+    assert [*contents(tmp_path / "in")] == ["side/run/frame1.png"]
 
 
 def test_members_that_would_fill_memory_and_packed_archives_are_refused(tmp_path):
