@@ -356,20 +356,30 @@ def _pairs(options: FramesOptions) -> Iterator[_Named]:
         raise UsageError("--left and --right are given together")
     else:
         matched = pair_inputs(pairs.left, pairs.right, search, match=pairs.match)
-    both = [views for pair in matched for views in _frames_of(*pair, pairs.side_by_side)]
+    alone = len(matched) == 1
+    both = [views for pair in matched for views in _frames_of(*pair, pairs.side_by_side, alone=alone)]
     options.running.note(*search.notes)
     yield from ((left, right, None) for left, right in both)
 
 
-def _frames_of(left: Input, right: Input, layout: Layout | None) -> list[tuple[Input, Input]]:
-    """List the frames of two videos, or of one that holds both views; images are a pair themselves."""
+def _frames_of(left: Input, right: Input, layout: Layout | None, *, alone: bool) -> list[tuple[Input, Input]]:
+    """List the frames of two videos, or of one that holds both views; images are a pair themselves.
+
+    Unless it is alone, a video of both views that cannot be opened is one frame, which fails and says why.
+    """
     if not (is_video(left.location) or is_video(right.location)):
         return [(left, right)]
     if packed := next((each.name for each in (left, right) if file_of(each.location) != each.location), None):
         raise UsageError(f"{packed}: is a video in an archive: unpack it")
     from rollcli.files.recordings.video import frames_of
 
-    return frames_of(left, right, layout)
+    try:
+        return frames_of(left, right, layout)
+    except InputError as error:
+        if alone or layout is None:
+            raise UsageError(str(error)) from error
+        rest = named_input(f"{left.location}#rest")
+        return [(rest, rest)]
 
 
 _Bags = list[tuple[str, list[str]]]  # each with its files

@@ -8,7 +8,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike, NDArray
 
-from rollcli.errors import UsageError
+from rollcli.errors import UsageError, as_usage
 from rollcli.estimator import estimate as estimator
 from rollcli.estimator.estimate import RollEstimate
 from rollcli.estimator.moments import map_of, usable_of
@@ -334,4 +334,5 @@ def _of_videos(name: str, right: str | None, layout: str | None) -> Sequence[tup
     from rollcli.files.recordings.video import frames_of
 
     left, other = (Input(each, each) for each in (name, right or name))
-    return frames_of(left, other, layout)
+    with as_usage():
+        return frames_of(left, other, layout)

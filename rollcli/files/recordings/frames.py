@@ -128,8 +128,7 @@ def frames_of_bag(
         _add_maps(bag, found, topics[chosen[0]], name)
     if not bag.frames and not found.broken:
         raise UsageError(f"{name}: has no messages of {' and '.join(chosen)}")
-    of_pairs = bool(views and bag.frames)
-    bag.frames += [(rest, rest if of_pairs else None) for rest in found.broken]
+    bag.frames += [(rest, rest if views else None) for rest in found.broken]
     return bag
 
 

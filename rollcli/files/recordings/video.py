@@ -52,9 +52,8 @@ class Video(NamedTuple):
 
 def _known(source: Input, *, decode: bool) -> Video:
     """Count the frames of a video: the number that its container states is a guess."""
-    with as_usage():
-        path = source.location
-        return _look_through(*state_of(path), source.name, decode or _leaves_out(path))
+    path = source.location
+    return _look_through(*state_of(path), source.name, decode or _leaves_out(path))
 
 
 @lru_cache(maxsize=4)
@@ -77,8 +76,10 @@ def frames_of(left: Input, right: Input, layout: str | None) -> list[tuple[Input
     Raises
     ------
     UsageError
-        A video is in a store, cannot be opened, has no frame, or has one that cannot be halved; or two differ
-        in size; or in length, and neither is cut off.
+        A video is in a store, or has a frame that cannot be halved; or two differ in size; or in length, and
+        neither is cut off.
+    InputError
+        One cannot be opened, or has no frame.
     """
     for each in (left, right):
         require_local(each.location)
@@ -113,6 +114,7 @@ def _listed(video: Video, source: Input) -> list[Input]:
 def read_video_frame(path: str, frame: str, name: str) -> NDArray[Any]:
     """Decode one frame of a video, BGR (H, W, 3); frames that follow each other are read in one pass."""
     if frame == "rest":
+        _known(Input(path, path), decode=False)  # which says why where it cannot be opened
         raise InputError(f"{name}: {broken_end(path) or 'is whole'}; the whole frames before are used")
     if not frame.isdecimal():
         raise InputError(f"{name}: no such frame in {path}")

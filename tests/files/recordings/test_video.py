@@ -163,13 +163,17 @@ def test_a_video_that_is_cut_gives_every_whole_frame_and_a_line(tmp_path, drive,
 
 
 @pytest.mark.parametrize("name", ["drive.mp4", "drive.mov"])
-def test_a_video_whose_index_is_cut_off_is_refused_with_a_line(tmp_path, drive, name):
+def test_a_video_whose_index_is_cut_off_is_refused_with_a_line_and_costs_no_other(tmp_path, drive, name):
     path = write_video(tmp_path / name, beside(drive[2]))
     data = path.read_bytes()
     for tenth in range(1, 10):
         path.write_bytes(data[: len(data) * tenth // 10])
         refusal = rollcli("estimate", name, "--side-by-side", cwd=tmp_path).refused()
         assert f"{name}: cannot be opened: it is cut off" in refusal
+    write_video(tmp_path / "whole.avi", beside(drive[2]), "MJPG")
+    first, *others = rows(rollcli("estimate", ".", "--side-by-side", cwd=tmp_path, status=3).out)
+    assert (first["file"], first["message"].startswith(f"{name}: cannot be opened")) == (f"{name}#rest", True)
+    assert [row["file"] for row in others] == [f"whole.avi#{each:06d}" for each in range(COUNT)]
 
 
 def test_a_video_that_was_cut_by_its_edit_list_has_the_frames_that_it_shows(tmp_path, drive):
