@@ -42,9 +42,10 @@ def _entry(name: str, subject: object) -> Iterator[str]:
         yield f"```python\n{_call(name, subject)}\n```\n"
     yield _markdown(inspect.getdoc(subject) or "")
     for member, each in vars(subject).items() if inspect.isclass(subject) else ():
-        called = inspect.isfunction(inspect.unwrap(getattr(each, "__func__", each)))
+        called = inspect.isfunction(plain := inspect.unwrap(getattr(each, "__func__", each)))
         if not member.startswith("_") and (called or isinstance(each, property | cached_property)):
-            yield f"#### {name}.{member}{'()' * called}\n\n{_markdown(inspect.getdoc(each) or '')}"
+            given = f"({', '.join([*inspect.signature(plain).parameters][1:])})" if called else ""
+            yield f"#### {name}.{member}{given}\n\n{_markdown(inspect.getdoc(each) or '')}"
 
 
 def _call(name: str, function: object) -> str:

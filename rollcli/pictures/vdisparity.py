@@ -49,6 +49,10 @@ def v_disparity(
     max_disparity : float, optional
         Pixels; by default just above the largest of the map, where a few far beyond all others do not count.
 
+    Returns
+    -------
+    VDisparity
+
     Raises
     ------
     UsageError
