@@ -51,11 +51,10 @@ def _entry(name: str, subject: object) -> Iterator[str]:
 def _call(name: str, function: object) -> str:
     """How a function is called, a parameter a line: numbers as they are, types in the list below."""
     signature = inspect.signature(function)  # type: ignore[arg-type]
-    lines, starred = [], False
+    lines: list[str] = []
     for each in signature.parameters.values():
-        if each.kind is each.KEYWORD_ONLY and not starred:
+        if each.kind is each.KEYWORD_ONLY and "*" not in lines:
             lines.append("*")
-            starred = True
         star = "*" if each.kind is each.VAR_POSITIONAL else ""
         default = "" if each.default is each.empty else f"={_value(each.default)}"
         lines.append(f"{star}{each.name}{default}")
