@@ -1,8 +1,8 @@
 """What a file that is no disparity map in pixels seems to be, and what to do about it.
 
 Of 105 real maps none is taken for anything else, stretched to 8 bits or not. Of depth maps made of them 104
-are told, and so are 104 of the maps turned upside down, and each of 86 real photographs; of blurred and dark
-ones few are. The numbers lie amid the gaps that these files leave
+and more are told, and so is each of the maps turned upside down and of 86 real photographs; of blurred and
+dark ones few are. The numbers lie amid the gaps that these files leave
 (python tests/benchmarks/bench_diagnosis.py).
 """
 
