@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import PurePosixPath
-from typing import overload
+from typing import TYPE_CHECKING, overload
 
 from rollcli.errors import InputError, UsageError
 from rollcli.extras import require_extra
@@ -35,6 +35,9 @@ from rollcli.rig.calibration import Calibration, CalibrationOptions, require_cal
 from rollcli.rig.read_calibration import MAX_BYTES, parse_calibration, with_numbers
 from rollcli.run.frame import Frame
 from rollcli.run.options import FramesOptions, InputOptions, Layout
+
+if TYPE_CHECKING:
+    from rollcli.files.recordings.frames import Bags
 
 _TRIED = 8  # frames, until one can be read
 _MARK = "_camera"  # Cityscapes: aachen_000000_000019_camera.json
@@ -382,10 +385,7 @@ def _frames_of(left: Input, right: Input, layout: Layout | None, *, alone: bool)
         return [(rest, rest)]
 
 
-_Bags = list[tuple[str, list[str]]]  # each with its files
-
-
-def _bags(given: InputOptions) -> _Bags:
+def _bags(given: InputOptions) -> "Bags":
     """List the bags among the inputs, in natural order, each once; all inputs are bags, or none is.
 
     Raises
@@ -413,7 +413,7 @@ def _behind(name: str) -> list[str]:
     return sorted(found) or [name]
 
 
-def _in_bags(bags: _Bags, options: FramesOptions) -> Iterator[_Named]:
+def _in_bags(bags: "Bags", options: FramesOptions) -> Iterator[_Named]:
     from rollcli.files.recordings.frames import frames_of_bag, readable_bags
 
     bags, rests = readable_bags(bags)
