@@ -18,7 +18,7 @@ from rollcli.files.formats import read_image, read_stored
 from rollcli.pictures.derotate import derotate
 from rollcli.pictures.heights import CAMERA_HEIGHTS, METRES, FittedRoad, heights_over, steadied, unit_of
 from rollcli.pictures.overlay import draw_disparity, draw_heights, draw_road
-from rollcli.pictures.vdisparity import MiddleColumn, draw_v_disparity, v_disparity
+from rollcli.pictures.vdisparity import MiddleColumn, draw_v_disparity, shown_end, v_disparity
 from rollcli.report.sources import Subject
 from rollcli.run.options import EncodingOptions, FramesOptions
 from rollcli.run.read import FRAME_ERRORS, Source, read_source
@@ -169,7 +169,7 @@ def _counts(disparity: NDArray[Any], scale: NDArray[Any], curve: Parabola | None
     histogram = v_disparity(scale)
     bins = min(histogram.counts.shape[1], _MOST_BINS)
     counted = v_disparity(disparity, bins=bins, max_disparity=histogram.max_disparity)
-    return draw_v_disparity(counted, curve)
+    return draw_v_disparity(counted, curve, end=shown_end(histogram))
 
 
 def _encoded(picture: NDArray[Any]) -> Picture:

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from rollcli.files.results import read_result
+from rollcli.pictures.vdisparity import BOTTOM_MARGIN
 from rollcli.report import pictures, run
 from tests.report.results import row, write_result
 from tests.run_cli import interrupt_in, road_map, rollcli, write_kitti, write_maps
@@ -259,8 +260,8 @@ def test_results_of_several_runs_are_drives_and_shards_are_one(tmp_path):
     assert "named twice" in rollcli("report", "a.csv", "a.csv", *again, cwd=tmp_path).refused()
 
 
-def test_the_captions_say_what_the_map_is_turned_by_where_fx_and_fy_differ(tmp_path):
-    write_kitti(tmp_path / "maps" / "frame0.png", road_map(0.2))
+def test_the_captions_say_what_the_map_is_turned_by_and_both_of_its_counts_have_one_scale(tmp_path):
+    write_kitti(tmp_path / "maps" / "frame0.png", 1.04 * road_map(0.2))
     rig = ["P0: 100 0 80 0 0 200 60 0 0 0 1 0", "P1: 100 0 80 -50 0 200 60 0 0 0 1 0"]
     (tmp_path / "calib.txt").write_text("\n".join(rig))
     rollcli("estimate", "maps", "--calib", "calib.txt", "-o", "rolls.csv", cwd=tmp_path, status=0)
@@ -269,3 +270,5 @@ def test_the_captions_say_what_the_map_is_turned_by_where_fx_and_fy_differ(tmp_p
     assert abs(only.image_roll_deg - only.roll_deg) > 0.5
     (turned,) = set(re.findall(r"Map, de-rotated by ([+−\d.]+)°", page_of(tmp_path)))
     assert float(turned.replace("−", "-")) == pytest.approx(only.image_roll_deg, abs=0.006)
+    before, after = (seen(each)[-BOTTOM_MARGIN:] for each in pictures_of(tmp_path)[-2:])
+    assert np.abs(before - after).mean() < 1
