@@ -21,6 +21,7 @@ _COLOURS = {
     "suspect-text": ("a85400", "f0a152"),
     "error": ("c43a5b", "ee7d98"),
     "band": ("2563c929", "6ea3f733"),
+    "mounting": ("12856b29", "4cc3a233"),
 }
 LIGHT, DARK = ({name: modes[place] for name, modes in _COLOURS.items()} for place in (0, 1))
 

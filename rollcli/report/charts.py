@@ -24,7 +24,7 @@ from rollcli.stereo.misalignment import Misalignment
 Trace = dict[str, Any]
 
 _FEW = 10  # frames, each with a tick
-_BAND = {"fill": "toself", "fillcolor": "@band", "hoverinfo": "skip"}
+_BAND = {"fill": "toself", "hoverinfo": "skip"}
 _TEXT = "%{text}<extra></extra>"
 _UNITS = (("h", 3600.0), ("min", 60.0), ("s", 1.0))  # name, seconds; each from two of it on
 _DECIMALS = 7  # of hours less than a thousandth of a second
@@ -108,7 +108,7 @@ def rig_traces(
         As plotly takes them; empty ones are left out.
     """
     name = quantity.name.replace("_", " ")
-    band = _trace("mounting, 95 %", "lines", [], [], **_BAND, line={"width": 0})
+    band = _trace("mounting, 95 %", "lines", [], [], **_BAND, fillcolor="@mounting", line={"width": 0})
     means = _trace(
         "mounting", "lines", [], [], text=[], hovertemplate=_TEXT, line={"color": "@c3", "width": 2}
     )
@@ -328,7 +328,7 @@ def chart_over_frames(rows: Sequence[Row], quantity: Quantity, rig: RigAssessmen
     reasons = [label(rows[at], "") for at in failed]
     stretches = _stretches(sure, starts)
     edges = {"color": "@band", "width": 1}  # a frame alone is seen too
-    band = _trace("95 % interval", "lines", [], [], **_BAND, line=edges)
+    band = _trace("95 % interval", "lines", [], [], **_BAND, fillcolor="@band", line=edges)
     for stretch in _stretches([at for at in sure if halves[at] is not None], starts):
         _add_band(band, *([each[at] for at in stretch] for each in (axis.places, values, halves)))
     line = {"line": {"color": "@c1", "width": 1.5}, "marker": {"color": "@c1"}}

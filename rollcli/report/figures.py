@@ -97,8 +97,8 @@ def _drawn(chart: Chart | Drawing, size: Size) -> Figure:
         side.set_visible(False)
     axes.tick_params(length=0, which="both")
     if names:
-        needed = (_SWATCH + _LETTER * max(map(len, names))) * size.font
-        columns = min(len(names), max(1, int(size.width / needed)))
+        needed = [(_SWATCH + _LETTER * len(name)) * size.font for name in names]
+        columns = len(names) if sum(needed) <= size.width else max(1, int(size.width / max(needed)))
         figure.legend(samples, names, loc="outside upper left", ncols=columns, handlelength=2, borderpad=0)
     return figure
 
