@@ -20,11 +20,17 @@ def round_step(least: float) -> float:
     return next(each * power for each in (1, 2, 5, 10) if each * power >= least * (1 - 1e-9))
 
 
+def unit_of_rows(height: int) -> int:
+    """Return by what the margins and letters beside a map of so many rows are enlarged."""
+    return max(1, height // _UNIT_ROWS)
+
+
 _ROAD = (220, 230, 40)  # BGR
 _TINT = 0.5
 _BLOCK = 2**20  # pixels at a time: what they need is large in large maps
-BAR_WIDTH = 64  # of the colour bar, pixels
-_LABEL_EVERY = 50  # pixels along the bar
+_UNIT_ROWS = 480  # sizes below are pixels; a map of so many times these rows has them so many times larger
+BAR_WIDTH = 64  # of the colour bar
+_LABEL_EVERY = 50  # along the bar
 INK, FONT, FONT_SIZE = (60, 60, 60), cv2.FONT_HERSHEY_SIMPLEX, 0.36
 
 
@@ -88,11 +94,11 @@ def draw_preview(disparity: NDArray[Any]) -> Pixels:
     Returns
     -------
     ndarray of uint8, shape (H, W + BAR_WIDTH, 3)
-        BGR.
+        BGR; see `with_bar`.
     """
     picture = draw_disparity(disparity)
     height, top = len(picture), brightest(np.asarray(disparity))
-    step = round_step(top * _LABEL_EVERY / height) if height > _LABEL_EVERY else top
+    step = round_step(top * _LABEL_EVERY * unit_of_rows(height) / height) if height > _LABEL_EVERY else top
     labels = (number * step for number in range(int(top / step * (1 + 1e-9)) + 1))
     ticks = [(label / top, f"{label:g}" if label else "0 px") for label in labels]
     return with_bar(picture, _colours()[:0:-1], ticks)
@@ -125,15 +131,16 @@ def with_bar(picture: Pixels, colours: Pixels, ticks: Iterable[tuple[float, str]
     Returns
     -------
     ndarray of uint8, shape (H, W + BAR_WIDTH, 3)
-        BGR.
+        BGR. Bar and letters are twice as large for 960 rows, three times for 1440, and so on.
     """
     height = len(picture)
-    bar = np.full((height, BAR_WIDTH, 3), 255, np.uint8)
+    unit = unit_of_rows(height)
+    bar = np.full((height, BAR_WIDTH * unit, 3), 255, np.uint8)
     levels = np.linspace(len(colours) - 1, 0, height).astype(np.intp)
-    bar[:, 8:24] = colours[::-1][levels][:, None]
+    bar[:, 8 * unit : 24 * unit] = colours[::-1][levels][:, None]
     for place, text in ticks:
-        row = min(max(round((1 - place) * (height - 1)) + 4, 9), height - 4)
-        cv2.putText(bar, text, (28, row), FONT, FONT_SIZE, INK, 1, cv2.LINE_AA)
+        row = min(max(round((1 - place) * (height - 1)) + 4 * unit, 9 * unit), height - 4 * unit)
+        cv2.putText(bar, text, (28 * unit, row), FONT, FONT_SIZE * unit, INK, unit, cv2.LINE_AA)
     return np.hstack([picture, bar])
 
 
@@ -185,7 +192,7 @@ def draw_heights(
     Returns
     -------
     ndarray of uint8, shape (H, W + BAR_WIDTH, 3)
-        BGR.
+        BGR; see `with_bar`.
     """
     # level 1 is the lowest height, 128 the road, 255 the highest
     places = np.linspace(1, 255, len(_BELOW_TO_ABOVE[0]))

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from rollcli.errors import UsageError
 from rollcli.estimator.moments import has_disparity, map_of, strips
 from rollcli.estimator.road.model import Parabola
-from rollcli.pictures.overlay import FONT, FONT_SIZE, INK, Pixels, round_step
+from rollcli.pictures.overlay import FONT, FONT_SIZE, INK, Pixels, round_step, unit_of_rows
 
 _MAX_BINS, _MOST_BINS = 1024, 65535  # unless asked for; and ever, as an image of that width
 _BLOCK = 1 << 22  # pixels counted at a time: a large map would take 40 bytes a pixel
@@ -142,7 +142,7 @@ class MiddleColumn(NamedTuple):
         return (y - self.start) / self.step
 
 
-_UNIT_ROWS = 480  # sizes below are pixels; a map of so many times these rows has them so many times larger
+# sizes below are pixels, times `unit_of_rows`
 LEFT_MARGIN, BOTTOM_MARGIN = 40, 32  # the first rows of a picture are the rows of the map
 _SHOWN = 0.998  # share of the pixels within the shown range: a few outliers must not squeeze the road
 _ROUND_PX = 16.0  # the range ends at a multiple of this, so that frames of one drive share their scale
@@ -179,7 +179,7 @@ def draw_v_disparity(
         BGR. Its first H rows are the rows of the map; the margins name rows and disparities, in pixels.
         Width, margins and letters are twice as large for 960 rows, three times for 1440, and so on.
     """
-    unit = max(1, len(histogram.counts) // _UNIT_ROWS)
+    unit = unit_of_rows(len(histogram.counts))
     counts, top = shown_counts(histogram, _WIDTH * unit, end or shown_end(histogram))
     light = np.log1p(counts)
     brightest = float(np.percentile(light[counts > 0], 99.9)) if counts.any() else 1.0

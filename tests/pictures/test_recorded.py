@@ -273,7 +273,7 @@ CASES = {
         f"preview of {height} rows to {top:g} px": partial(
             _picture, draw_preview, np.linspace(0, top, 40 * height).reshape(height, 40)
         )
-        for height, top in ((40, 60.0), (50, 33.0), (51, 60.0), (120, 0.7), (260, 150.0))
+        for height, top in ((40, 60.0), (50, 33.0), (51, 60.0), (120, 0.7), (260, 150.0), (960, 150.0))
     },
     "road": lambda: _picture(draw_road, _map((60, 80)), _disc()),
     "road on a photo": lambda: _picture(draw_road, _map((60, 80)), _disc(hole=False), _photo() >> 4),
