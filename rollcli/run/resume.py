@@ -63,7 +63,8 @@ CONVENTIONS = {
     "against the left one, px of the size matched at; twist: vertical shift in the corners",
     "alignment": "medians of these over the pairs",
     "alpha0, alpha1, alpha2": "road disparity in px = alpha0 + alpha1 y + alpha2 y^2",
-    "y": "v cos(theta) - u sin(theta), px; u right, v down, from the centre of the top-left pixel",
+    "y": "v cos(theta) - u sin(theta), px; u right, v down, from the centre of the top-left pixel; theta: "
+    "image_roll_deg where there is one, else roll_deg",
 }
 
 _REPLACES = "replaces_images"  # while a run with --overwrite is not over
