@@ -29,10 +29,8 @@ def summarize(rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def degrees(angle: float | None, digits: int = 2, *, sign: bool = True) -> str:
+def degrees(angle: float, digits: int = 2, *, sign: bool = True) -> str:
     """Return an angle to read: with its sign, a true minus, and its unit."""
-    if angle is None:
-        return "–"
     text = f"{angle:+.{digits}f}" if sign and round(angle, digits) else f"{abs(angle):.{digits}f}"
     return text.replace("-", "−") + "°"
 
