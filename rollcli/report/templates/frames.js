@@ -63,7 +63,7 @@
     const facts = element("p", "", `frame ${row[NUMBER].toLocaleString("en")} · ${row[ANGLE]} · ${row[STATUS]}`);
     detail.replaceChildren(element("h3", "", row[FILE]), facts, element("p", "", row[WHY]));
     if (shown) detail.append(shown.cloneNode(true));
-    else detail.append(element("p", "note", "This page has no pictures of it: --gallery N shows more frames."));
+    else if (row[ROLL] !== null) detail.append(element("p", "note", "This page has no pictures of it: --gallery N shows more frames."));
     detail.querySelectorAll("[id]").forEach(each => each.removeAttribute("id"));
     detail.hidden = false;
   };
