@@ -24,7 +24,7 @@ from rollcli.run.options import EncodingOptions, FramesOptions
 from rollcli.run.read import FRAME_ERRORS, Source, read_source
 
 # small enough that a page with a dozen frames opens at once, large enough to see a stripe of noise
-_WIDEST, _MOST_BINS, _QUALITY = 1280, 320, 82
+_WIDEST, _QUALITY = 1280, 82
 _SAME = math.radians(1e-4)  # a result holds angles to a millionth of a degree
 
 # which picture an image is that `estimate` drew
@@ -167,8 +167,7 @@ def _heights(subject: Subject, source: Source | None) -> NDArray[Any] | None:
 def _counts(disparity: NDArray[Any], scale: NDArray[Any], curve: Parabola | None = None) -> NDArray[Any]:
     """Draw the v-disparity from 0 to the largest disparity of `scale`, so that two can be compared."""
     histogram = v_disparity(scale)
-    bins = min(histogram.counts.shape[1], _MOST_BINS)
-    counted = v_disparity(disparity, bins=bins, max_disparity=histogram.max_disparity)
+    counted = v_disparity(disparity, bins=histogram.counts.shape[1], max_disparity=histogram.max_disparity)
     return draw_v_disparity(counted, curve, end=shown_end(histogram))
 
 
