@@ -16,7 +16,6 @@ _COLOURS = {
     "c4": ("8a4fc7", "bd93ee"),
     "c5": ("c43a5b", "ee7d98"),
     "c6": ("6b7684", "9aa6b5"),
-    "ok": ("12856b", "4cc3a2"),
     "suspect": ("d9730d", "f0a152"),
     "suspect-text": ("a85400", "f0a152"),
     "error": ("c43a5b", "ee7d98"),

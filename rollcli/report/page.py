@@ -35,7 +35,7 @@ class Chart:
         What it shows, for those who cannot see it.
     data : sequence of mapping
         The traces. No NaN: None where there is no value. A colour may be "@" and a name of the page's own
-        colours, such as "@c1", "@ok" or "@muted": these follow light and dark mode.
+        colours, such as "@c1", "@error" or "@muted": these follow light and dark mode.
     layout : mapping
         Titles, ranges, kinds of axes; fonts, margins and colours are the page's.
     still : str
