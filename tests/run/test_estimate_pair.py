@@ -164,15 +164,16 @@ def test_the_row_says_where_no_road_was_matched_along_its_plane(pair, tmp_path):
 
 
 def test_an_estimate_that_fails_says_why_the_map_may_be_wrong(tmp_path):
-    frame = render_frame(FrameSpec(scene="street", roll=math.radians(3), seed=12, colour=False))
-    write_views(tmp_path, "a.png", frame.left, frame.right)
+    left = np.random.default_rng(0).integers(0, 256, (240, 400), dtype=np.uint8)
+    right = np.roll(left, -15, axis=1)  # a wall
+    write_views(tmp_path, "a.png", left, right)
     run = rollcli("estimate", *VIEWS, "--num-disparities", "16", cwd=tmp_path)
     (row,) = rows_of(run.out)
     assert row["status"] == "error"
     assert row["message"].startswith("no road: ")
     assert "; use a larger --num-disparities" in row["message"]
     with pytest.raises(package.EstimationError) as raised:
-        package.estimate_pair(frame.left, frame.right, stereo=package.StereoOptions(num_disparities=16))
+        package.estimate_pair(left, right, stereo=package.StereoOptions(num_disparities=16))
     assert str(raised.value) == row["message"]
 
 
