@@ -147,6 +147,13 @@ def test_dark_and_hazy_views_have_the_grey_levels_of_clear_ones(by, haze, kind):
     assert all(each is clear for each in as_clear((clear, clear)))
 
 
+def test_faint_views_are_spread_by_four_times_at_most():
+    """More would be noise."""
+    faint = (GREY // 16 + 20,) * 2
+    between = np.percentile(faint[0], [5, 95])
+    assert np.diff(np.percentile(as_clear(faint)[0], [5, 95])) == pytest.approx(4 * np.diff(between), abs=1)
+
+
 @pytest.mark.parametrize("level", [0, 16])
 def test_neither_a_border_of_one_view_alone_nor_a_tenth_more_light_makes_a_view_brighter(level):
     grey = np.random.default_rng(0).integers(60, 200, (120, 160), dtype=np.uint8)
