@@ -53,7 +53,7 @@ FURTHER = {
         "stereo/test_alignment stereo/test_stereo"
     ),
     "report": "cli/test_recorded cli/test_mistakes cli/test_outputs",
-    "stereo": "run/test_recorded run/test_estimate_pair",
+    "stereo": "run/test_recorded run/test_estimate_pair test_python",
 }
 _QUICKLY = ("-x", "-q", "-p", "no:cacheprovider")
 _NOTICED = (pytest.ExitCode.TESTS_FAILED, pytest.ExitCode.INTERRUPTED, pytest.ExitCode.USAGE_ERROR)

@@ -20,6 +20,13 @@ def test_views_twice_as_large_shift_twice_as_far_everywhere():
     assert lies.shifts(100, 300) == pytest.approx(expected)
 
 
+def test_slopes_are_those_of_how_far_down_points_are_seen():
+    lies, (x, y), step = Misalignment(1.5, 0.02, -0.03, 4e-5, 0.01, 2e-5), (150.0, -40.0), 1e-3
+    across = lies.down(x + step, y) - lies.down(x - step, y)
+    down = lies.down(x, y + step) - lies.down(x, y - step)
+    assert lies.slopes(x, y) == pytest.approx((across / (2 * step), down / (2 * step)))
+
+
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_what_a_result_says_is_in_px_degrees_and_per_cent_and_is_read_back(sign):
     odd = Misalignment(*(sign * each for each in (1.25, math.radians(0.125), 0.00375, 3e-5)))
