@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 def main() -> None:
     """Run the program; an error that nobody expected is one line too."""
     sys.excepthook = _say_in_one_line
+    # else workers look for Python's own modules in the current folder, which a stranger may have filled
+    os.environ.setdefault("PYTHONSAFEPATH", "1")
     try:
         from rollcli.run.workers.interrupt import raise_on_signals
 

@@ -2,6 +2,7 @@
 
 import random
 import signal
+import sys
 from itertools import accumulate
 from pathlib import Path
 
@@ -16,7 +17,16 @@ from rollcli.run.options import EstimateOptions, ResultOptions
 from rollcli.run.result_file import inputs_line
 from rollcli.run.workers.chunks import Chunks, Done, Span, Work
 from tests.object_store import joined
-from tests.run_cli import contents, estimated, rollcli, started, wait_for_files, write_maps
+from tests.run_cli import (
+    contents,
+    environment,
+    estimated,
+    python,
+    rollcli,
+    started,
+    wait_for_files,
+    write_maps,
+)
 from tests.slow import mostly_slow
 
 KITTI = ReadAs(frozenset(["kitti"]))
@@ -110,6 +120,16 @@ def test_parts_of_several_workers_are_the_file_of_one_process(maps, bucket, rows
     assert rollcli(*line, cwd=maps).status == 3
     assert joined(f"{bucket}/{rows}.csv") == (maps / "rolls.csv").read_bytes()
     assert len(list_names(f"{bucket}/{rows}.csv")) == -(-23 // int(rows))
+
+
+@pytest.mark.skipif(sys.version_info < (3, 11), reason="Python 3.10 searches the current folder")
+def test_workers_run_nothing_that_lies_in_the_current_folder(maps):
+    pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
+    (maps / "struct.py").write_text("open('has run', 'w').close()")
+    installed = "import sys; sys.path.remove(''); from rollcli.__main__ import main; main()"
+    line = ("estimate", "maps", "-o", "rolls.parquet", "-j", "2", "-q")
+    assert python(installed, *line, cwd=maps, env=environment()).returncode == 3
+    assert not (maps / "has run").exists()
 
 
 @pytest.mark.parametrize("missing", mostly_slow([[0], [1, 2, 5], [0, 11], range(12)], [1, 2, 5]))
