@@ -170,10 +170,12 @@ def test_completion_is_there_for_each_shell_it_names(tmp_path, shell):
         ("rollcli estimate --method g", {"gd", "gss"}),
         ("rollcli derotate --fr", {"--from"}),
         ("rollcli evaluate ", {"accuracy", "paper"}),
+        ("rollcli unknown es", {"estimate"}),
     ],
 )
 def test_commands_options_and_choices_complete(tmp_path, words, expected):
     position = str(words.count(" "))
     variables = {"_ROLLCLI_COMPLETE": "bash_complete", "COMP_WORDS": words, "COMP_CWORD": position}
-    found = {line.partition(",")[2] for line in rollcli(cwd=tmp_path, **variables).out.splitlines()}
-    assert found == expected
+    done = rollcli(cwd=tmp_path, **variables)
+    assert {line.partition(",")[2] for line in done.out.splitlines()} == expected
+    assert done.err == ""  # it would be in the middle of what is typed
