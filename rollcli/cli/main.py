@@ -106,15 +106,17 @@ def _with_hint(error: click.ClickException) -> str:
 
 @contextlib.contextmanager
 def _ended_by_its_reader() -> Iterator[None]:
-    """End quietly where the reader of stdout has left, which click would call a failure; say a full disk."""
+    """End quietly where the reader of stdout has left, and say a full disk, and a folder that is gone."""
     try:
         yield
-    except BrokenPipeError:
+    except BrokenPipeError:  # which click would call a failure
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, 1)  # the interpreter flushes the rest
         os.close(nowhere)
         raise click.exceptions.Exit(ExitStatus.DONE) from None
     except OSError as error:
+        if isinstance(error, FileNotFoundError) and error.filename is None:  # of os.getcwd alone
+            raise InputError("the current folder is gone") from error
         if error.errno != errno.ENOSPC:
             raise
         raise output_error(error.filename or "standard output", error) from None

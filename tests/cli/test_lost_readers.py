@@ -31,6 +31,13 @@ def without_reader(folder, arguments, stream):
     return done
 
 
+def test_a_current_folder_that_is_gone_is_said(tmp_path):
+    shell = ["sh", "-c", 'rmdir "$PWD"; exec "$@"', "sh"]
+    (tmp_path / "gone").mkdir()
+    done = ended([*shell, *command("estimate", "maps")], tmp_path / "gone")
+    assert (done.returncode, done.stderr) == (2, "rollcli: the current folder is gone\n")
+
+
 NO_DISK = pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
 
 

@@ -17,16 +17,7 @@ from rollcli.run.options import EstimateOptions, ResultOptions
 from rollcli.run.result_file import inputs_line
 from rollcli.run.workers.chunks import Chunks, Done, Span, Work
 from tests.object_store import joined
-from tests.run_cli import (
-    contents,
-    environment,
-    estimated,
-    python,
-    rollcli,
-    started,
-    wait_for_files,
-    write_maps,
-)
+from tests.run_cli import contents, estimated, python, rollcli, started, wait_for_files, write_maps
 from tests.slow import mostly_slow
 
 KITTI = ReadAs(frozenset(["kitti"]))
@@ -128,7 +119,7 @@ def test_workers_run_nothing_that_lies_in_the_current_folder(maps):
     (maps / "struct.py").write_text("open('has run', 'w').close()")
     installed = "import sys; sys.path.remove(''); from rollcli.__main__ import main; main()"
     line = ("estimate", "maps", "-o", "rolls.parquet", "-j", "2", "-q")
-    assert python(installed, *line, cwd=maps, env=environment()).returncode == 3
+    assert python(installed, *line, cwd=maps).returncode == 3
     assert not (maps / "has run").exists()
 
 
