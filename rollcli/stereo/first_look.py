@@ -173,11 +173,15 @@ def _look(
 def _match_again(views: Views, top: float) -> SmallMatch | None:
     """Match over the range that another match has shown to be enough; None where it is not."""
     searched = _BEYOND * top + 4
-    disparity = _match(views, searched)
-    found = _top(disparity, 99)
-    if found is None or found > _WITHIN * searched:
+    return _enough(_match(views, searched), searched)
+
+
+def _enough(disparity: Map, searched: float) -> SmallMatch | None:
+    """Take a map over this range; None where hardly anything is found, or disparities crowd at its end."""
+    top = _top(disparity, 99)
+    if top is None or top > _WITHIN * searched:
         return None
-    return SmallMatch(found, disparity, _known(disparity))
+    return SmallMatch(top, disparity, _known(disparity))
 
 
 def _match_small(views: Views) -> SmallMatch | None:
@@ -191,9 +195,7 @@ def _match_small(views: Views) -> SmallMatch | None:
     half = shrink_both(views, 2)
     rough, found = _rough(half), None
     if rough is not None and rough < _NEAR * half[0].shape[1]:
-        found = _match_again(views, 2 * rough)
-        if found is None or found.believed < _PLAIN:
-            found = _match_up_to(views, 2 * rough)
+        found = _match_up_to(views, 2 * rough, shown=True)
     if found is None:  # a near scene, or grain that is gone at half the size
         found = _match_up_to(views, _rough(views))
     if found is None or found.believed < _HARDLY_BELIEVED:
@@ -207,20 +209,22 @@ def _rough(views: Views) -> float | None:
     return _top(_match(views, views[0].shape[1] / 2), 98)
 
 
-def _match_up_to(views: Views, top: float | None) -> SmallMatch | None:
+def _match_up_to(views: Views, top: float | None, *, shown: bool = False) -> SmallMatch | None:
     """Match over a range that grows for as long as disparities of about `top` and more meet its end.
 
     Where there is nothing to match, any candidate wins, and with more of them another one: so only what a
-    search twice as wide finds too is believed.
+    search twice as wide finds too is believed, unless other views have `shown` the first range and most is
+    found in it.
     """
     found = None
     for _ in range(_RANGE_ROUNDS):
         if top is None:
             return None
         searched = _BEYOND * top + 4
-        narrow, wide = (
-            _match(views, count) for count in (searched, min(2 * searched, views[0].shape[1] / 2))
-        )
+        narrow = _match(views, searched)
+        if shown and (plain := _enough(narrow, searched)) and plain.believed >= _PLAIN:
+            return plain
+        shown, wide = False, _match(views, min(2 * searched, views[0].shape[1] / 2))
         believed = np.where(np.abs(narrow - wide) < 1, narrow, np.float32(0))
         top = _top(believed, 99)
         disparity = np.where(wide > 0, believed, narrow)
