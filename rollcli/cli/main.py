@@ -60,13 +60,13 @@ class LazyGroup(click.Group):
 
     def make_context(self, *args: Any, **extra: Any) -> click.Context:
         """Parse, which answers --help."""
-        with _ended_by_its_reader():
+        with _system_faults_told():
             return super().make_context(*args, **extra)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Call the command."""
         try:
-            with _ended_by_its_reader():
+            with _system_faults_told():
                 return super().invoke(ctx)
         except KeyboardInterrupt:  # click would write a line of its own
             say("interrupted")
@@ -105,7 +105,7 @@ def _with_hint(error: click.ClickException) -> str:
 
 
 @contextlib.contextmanager
-def _ended_by_its_reader() -> Iterator[None]:
+def _system_faults_told() -> Iterator[None]:
     """End quietly where the reader of stdout has left, and say a full disk, and a folder that is gone."""
     try:
         yield
