@@ -80,7 +80,8 @@ def test_downscaled_pairs_have_the_pose_of_the_full_size(tmp_path):
     assert sum(agree) >= 17  # of twenty, where 95 % agree, 98 % have as many
 
 
-def test_depth_maps_become_the_disparities_of_their_calibration(maps):
+@pytest.mark.parametrize("doffs", ["0", "20"])  # of 20 px, what is farther than 6 m would be no data
+def test_depth_maps_become_the_disparities_of_their_calibration(maps, doffs):
     disparity = cast(CALIBRATION, ROLL, PITCH, HEIGHT)
     depth = np.where(disparity > 0, RIG.fx * RIG.baseline / np.where(disparity > 0, disparity, 1), np.nan)
     (maps / "depth").mkdir()
@@ -88,11 +89,12 @@ def test_depth_maps_become_the_disparities_of_their_calibration(maps):
     millimetres = np.rint(1000 * np.clip(np.nan_to_num(depth), 0, 65)).astype(np.uint16)
     cv2.imwrite(str(maps / "depth" / "millimetres.png"), millimetres)
 
-    depths = ("depth", "--encoding", "depth", "--calib", "calib.txt")
+    depths = ("depth", "--encoding", "depth", "--calib", "calib.txt", "--doffs", doffs)
     done = rollcli("estimate", *depths, "--derotated", "level", cwd=maps, status=0)
     for row in rows_of(done.out):
         found = [float(row[name]) for name in ("roll_deg", "pitch_deg", "height_m")]
         assert found == pytest.approx([2.0, 6.0, HEIGHT], abs=0.002)
+        assert float(row["valid_fraction"]) == pytest.approx(np.mean(disparity > 0), abs=0.01)
     level = rollcli("estimate", "level", *depths[1:], cwd=maps)
     assert [float(row["roll_deg"]) for row in rows_of(level.out)] == pytest.approx([0.0, 0.0], abs=0.05)
     assert rollcli("vdisparity", *depths, "-o", "v", cwd=maps).status == 0
