@@ -84,6 +84,17 @@ def test_what_opencv_itself_writes_is_read_and_swapped_cameras_are_told(tmp_path
     assert "its right camera stands left of its left one" in refusal(rectified(path, -shift, names)[1])
 
 
+def test_what_opencv_appends_to_a_file_is_read(tmp_path):
+    whole, parts = tmp_path / "whole.yml", tmp_path / "parts.yml"
+    results, text = rectified(whole, np.array([[-RIG.baseline], [0], [0]]), ("P1", "P2"))
+    for name in ("P1", "P2"):
+        storage = cv2.FileStorage(str(parts), cv2.FILE_STORAGE_APPEND)
+        storage.write(name, results[name])
+        storage.release()
+    assert parts.read_text().count("---") == 2
+    assert parse(parts.read_text()) == parse(text)
+
+
 def test_bytes_that_are_no_text_and_large_files_are_refused(tmp_path):
     for data, reason in ((b"P0: \xff\xfe\x00", "is not text"), (b" " * (1 << 20 | 1), "up to 1 MB")):
         (tmp_path / "c").write_bytes(data)

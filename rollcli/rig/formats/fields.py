@@ -163,8 +163,9 @@ class File(NamedTuple):
 
 _MOST = 1 << 17  # characters, which PyYAML parses in a second; real calibrations have a few thousand
 _MATRIX = "tag:yaml.org,2002:opencv-"
-# OpenCV's first line is no directive of YAML, and its files may lack the space after a key's colon
-_DIRECTIVE = re.compile(r"^%YAML.*", re.MULTILINE)
+# OpenCV's first line is no directive of YAML, what it appends is no document of its own, and its files may
+# lack the space after a key's colon
+_NO_YAML = re.compile(r"^%YAML.*|^\.\.\.\s+---", re.MULTILINE)
 _TIGHT_KEY = re.compile(r"^( *[\w.]+):(?=\S)", re.MULTILINE)
 # PyYAML refuses tabs where other readers do not: anywhere but in the indentation
 _INNER_TABS = re.compile(r"(?<=\S)[ \t]*\t[ \t]*|^[ \t]+$", re.MULTILINE)
@@ -175,7 +176,8 @@ def parse_yaml(file: File) -> dict[str, Value]:
 
     ROS, Kalibr, ORB-SLAM and OpenCV write it; PyYAML parses it. What they have no use for is refused as soon
     as the parser meets it: anchors and aliases, which can make a few lines fill the memory, and tags, which
-    name objects. What follows the end of the first document is left alone; numbers stay the text they are.
+    name objects. What follows the end of the first document is left alone unless
+    OpenCV appended it; numbers stay the text they are.
 
     Raises
     ------
@@ -210,7 +212,7 @@ def parse_yaml(file: File) -> dict[str, Value]:
 
     if "%YAML:" in text:
         text = _TIGHT_KEY.sub(r"\1: ", text)
-    text = _INNER_TABS.sub(" ", _DIRECTIVE.sub("", text, count=1))
+    text = _INNER_TABS.sub(" ", _NO_YAML.sub("", text))
     try:
         values = Loader(text).get_data()
     except yaml.MarkedYAMLError as error:
