@@ -71,6 +71,15 @@ def rectified(path, shift, names):
     return found, path.read_text()
 
 
+@pytest.mark.parametrize("lacking", [0, 1])
+def test_the_size_of_a_ros_pair_is_that_of_the_file_that_states_one(lacking):
+    texts = [samples.ros(RIG, right=each) for each in (False, True)]
+    whole = parse(*texts)
+    texts[lacking] = texts[lacking].partition("\n")[2].partition("\n")[2]
+    assert parse(*texts) == whole
+    assert (whole.width, whole.height) == (RIG.width, RIG.height)
+
+
 @pytest.mark.parametrize("ending", ["yml", "xml", "json"])
 @pytest.mark.parametrize("names", [("R", "T", "P1", "P2", "Q"), ("P1", "P2"), ("Q",)], ids="-".join)
 def test_what_opencv_itself_writes_is_read_and_swapped_cameras_are_told(tmp_path, names, ending):

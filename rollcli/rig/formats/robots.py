@@ -29,6 +29,7 @@ def read_ros(first: File, second: File | None = None) -> Fields:
     both = File(f"{first.name} and {second.name}", "")
     if (left.tx != 0 and right.tx == 0) or left.tx < right.tx < 0:
         raise both.error("are in the wrong order: give --calib LEFT --calib RIGHT")
+    size, right_size = (one if one[0] else other for one, other in ((size, right_size), (right_size, size)))
     if size != right_size:
         one, other = ("x".join(map(str, each)) for each in (size, right_size))
         raise both.error(f"are of images of different sizes, {one} and {other}")
