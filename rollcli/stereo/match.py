@@ -47,7 +47,7 @@ def check_same_scene(small: SmallViews, look: FirstLook, measured: Measured | No
     Raises
     ------
     InputError
-        They are one image, are swapped, or show two scenes.
+        They are one image, are swapped, mirrored or upside down, or show two scenes.
     """
     matched = max(_share(look.measured), _share(measured))
     if matched >= _SURE:
@@ -59,7 +59,8 @@ def check_same_scene(small: SmallViews, look: FirstLook, measured: Measured | No
         raise InputError("the left and the right image are the same")
     if _share(first_look(SmallViews(small.views[::-1])).measured) >= _PLAIN * textured:
         raise InputError(
-            "the views seem swapped: the scene is matched when the right image is taken for the left one"
+            "the views seem swapped, mirrored or upside down: the scene is matched when the right image is "
+            "taken for the left one; disparities below 0 need --min-disparity"
         )
     if matched < _FEW * textured:
         height, width = small.views[0].shape

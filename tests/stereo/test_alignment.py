@@ -271,8 +271,10 @@ def test_a_camera_that_is_too_far_off_is_never_corrected_without_a_word(frame):
 
 
 def test_swapped_and_turned_views_are_told(frame):
-    with pytest.raises(InputError, match="the views seem swapped"):
-        match_pair(seen_by(frame.right, clockwise_deg=0.4, lower=1), frame.left, StereoOptions())
+    turned, told = seen_by(frame.right, clockwise_deg=0.4, lower=1), "swapped, mirrored or .* --min-disparity"
+    for views in ((turned, frame.left), (frame.left[:, ::-1], turned[:, ::-1])):
+        with pytest.raises(InputError, match=f"the views seem {told}"):
+            match_pair(*views, StereoOptions())
 
 
 def test_of_small_images_it_is_said_that_they_may_be_too_small(frame):
