@@ -18,7 +18,15 @@ from rollcli.stereo.alignment import Approach, Measured, SmallViews, level, text
 from rollcli.stereo.along_road import FindRoad, Levelled
 from rollcli.stereo.correction import Correction
 from rollcli.stereo.first_look import FirstLook, first_look, look_for_range
-from rollcli.stereo.misalignment import LEVEL, NO_SUPPORT, TOLERANCE, ColumnSupport, Misalignment, Tolerance
+from rollcli.stereo.misalignment import (
+    LEVEL,
+    NO_SUPPORT,
+    RECALIBRATE,
+    TOLERANCE,
+    ColumnSupport,
+    Misalignment,
+    Tolerance,
+)
 from rollcli.stereo.options import StereoOptions as StereoOptions
 from rollcli.stereo.refinement import refined
 from rollcli.stereo.row_fit import column_support, support_of_level
@@ -106,8 +114,12 @@ _FURTHEST = 12.0, 0.03, 0.02  # offset, rotation and scale that no rig in use ha
 # columns may be far from where they are believed to be; it is not level once it was levelled as a file says
 NOT_LEVELLED = "the views are not level, and could not be levelled, as where they are not rectified"
 TOO_LITTLE = "too little can be compared to tell whether the views are level"
-NOT_TOLD_BY_ROWS = "the rows do not tell whether the right view is larger or its rows are bent: recalibrate"
-PITCH_NOT_TOLD = "the rows do not tell whether the right camera is pitched or its image shifted: recalibrate"
+NOT_TOLD_BY_ROWS = (
+    f"the rows do not tell whether the right view is larger or its rows are bent: {RECALIBRATE}"
+)
+PITCH_NOT_TOLD = (
+    f"the rows do not tell whether the right camera is pitched or its image shifted: {RECALIBRATE}"
+)
 CONTRADICTS = "the views do not lie as the correction says"
 
 

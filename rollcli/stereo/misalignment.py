@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 _SAME = 2.0**-10  # px: two misalignments that differ by less anywhere are one
 _NEAR = 1 / 16  # of the width of a view: the disparity of what is near, where a shift by a tilt is told
 
+RECALIBRATE = "recalibrate, or give --align the file that `rig --correction` writes"
+
 
 @dataclass(frozen=True)
 class Misalignment:
@@ -235,4 +237,4 @@ def advice_of(lower: float, clockwise: float, larger: float, twist: float) -> st
         parts.append(f"the right image is {abs(larger):.2f} % {'larger' if larger > 0 else 'smaller'}")
     if abs(twist) >= 0.5:
         parts.append(f"the right image's rows are skewed by {abs(twist):.1f} px in the corners")
-    return ", ".join(parts) + ": recalibrate" if parts else ""
+    return f"{', '.join(parts)}: {RECALIBRATE}" if parts else ""

@@ -67,7 +67,7 @@ def test_a_run_says_the_median_over_its_pairs_and_what_to_do():
     assert rig.alignment()["frames"] == 3
     assert rig.alignment()["advice"] == (
         "the right camera is rolled by 0.31 degrees against the left, counter-clockwise seen from behind: "
-        "recalibrate"
+        "recalibrate, or give --align the file that `rig --correction` writes"
     )
 
 
