@@ -37,7 +37,7 @@ from rollcli.run.options import (
     PairOptions,
     RegionOptions,
 )
-from rollcli.run.plan import Plan
+from rollcli.run.plan import Plan, further_columns
 from rollcli.run.progress import RunSummary
 from rollcli.run.result_file import Inputs, data_of
 from rollcli.stereo.correction import Correction
@@ -569,6 +569,9 @@ def _differences(kept: KeptRows, was: Mapping[str, Any] | None, record: RunRecor
     again = "; --update does again what has changed" if updates else ""
     if was.get("calibration") != json.loads(json.dumps(now.get("calibration"))):
         yield f"the calibration differs{again}"
+    asked = plan.options
+    if further_columns(frames, None, asked) != further_columns(plan.frames, None, asked):
+        yield f"a new frame's fx and fy differ, which adds a column{'; --update does' if updates else ''}"
     hint = "; --update leaves out the rows of frames that are gone" if updates else ""
     if grown:
         hint = f"; new frames must sort last{', or be added by --update' if updates else ''}"
