@@ -87,7 +87,7 @@ def test_a_depth_map_is_refused_with_the_reason():
 
 def test_scattered_pixels_are_refused_with_the_reason():
     sparse = flat_road(5, **SIZE) * (np.random.default_rng(0).random((240, 320)) < 0.05)
-    with pytest.raises(EstimationError, match="at least half valid"):
+    with pytest.raises(EstimationError, match="no area of 12x12 pixels is at least half valid"):
         areas(sparse)
 
 
