@@ -36,6 +36,7 @@ FRAMES = {
     "off the centre": _frame("open", 0.3, -0.05, principal_point=(40.0, 30.5), seed=15),
     "looking down": _frame("street", -0.5, 0.6, seed=16),
     "upright": _frame("street", math.pi / 2, 0.1, seed=18),
+    "bare, dark on the right": _frame("bare", 0.0, 0.1, seed=19, gain=1e-4),
 }
 
 
