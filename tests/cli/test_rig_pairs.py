@@ -11,6 +11,7 @@ import pytest
 
 from tests.odd_views import seen_by, seen_turned
 from tests.run_cli import rollcli, rows_of
+from tests.sessions import play
 
 pytestmark = pytest.mark.slow
 
@@ -18,10 +19,10 @@ TRUTH = {"right_lower_px": 1.2, "right_clockwise_deg": 0.15, "right_larger_perce
 NEAR = {"right_lower_px": 0.1, "right_clockwise_deg": 0.02, "right_larger_percent": 0.05}
 
 
-def put_off(path, target):
-    """Turn a view by 0.15 degrees about its centre, enlarge it by 0.3 % and lower it by 1.2 px."""
+def put_off(path, target, larger=0.3):
+    """Turn a view by 0.15 degrees about its centre, enlarge it by so many percent and lower it by 1.2 px."""
     view = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    moved = seen_by(view, clockwise_deg=0.15, larger_percent=0.3, lower=1.2, border=cv2.BORDER_REPLICATE)
+    moved = seen_by(view, clockwise_deg=0.15, larger_percent=larger, lower=1.2, border=cv2.BORDER_REPLICATE)
     cv2.imwrite(str(target / path.name), moved)
 
 
@@ -85,6 +86,12 @@ def test_after_a_jump_the_correction_is_of_the_pairs_since(pairs):
     (pairs / "jump.csv").write_text("\n".join([*lines, ""]))
     assert rollcli("rig", "jump.csv", "--correction", "jump.json", "-q", cwd=pairs).status == 0
     assert columns(pairs / "jump.json") == columns(pairs / "use.json")
+
+
+def test_of_a_drift_the_last_pairs_are_matched_again(tmp_path):
+    play(tmp_path, "rig drifts.csv seed=5 frames=40 sd=0.02 drift=6 errors=[0.01,0.02] pairs=1.5")
+    done = rollcli("rig", "drifts.csv", "--correction", "c.json", "--dry-run", cwd=tmp_path)
+    assert re.findall(r"run/(\d+)\.png", done.out) == [str(number) for number in range(16, 40)]
 
 
 def test_the_error_of_depth_is_the_same_at_each_size_that_pairs_are_matched_at(pairs):
@@ -189,9 +196,7 @@ def test_a_drive_says_how_its_pairs_lie_and_not_what_an_earlier_correction_says(
 def test_intervals_hold_where_right_views_have_grown_a_little_since_the_correction(pairs):
     (pairs / "grown").mkdir()
     for path in sorted((pairs / "right").iterdir()):
-        view = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-        grown = seen_by(view, clockwise_deg=0.15, larger_percent=0.4, lower=1.2, border=cv2.BORDER_REPLICATE)
-        cv2.imwrite(str(pairs / "grown" / path.name), grown)
+        put_off(path, pairs / "grown", larger=0.4)
     given = ("--left", "left", "--right", "grown", "--align", "use.json", "-o", "grown.csv", "-q")
     assert rollcli("estimate", *given, cwd=pairs).status == 0
     apart = np.abs(rolls(pairs / "grown.csv") - rolls(pairs / "level.csv"))
