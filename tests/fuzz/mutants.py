@@ -46,7 +46,7 @@ FURTHER = {
     "run": (
         "cli/test_recorded files/stores/test_turns cli/test_mistakes cli/test_outputs cli/test_help "
         "cli/test_frames cli/test_calibration cli/test_lost_readers cli/test_bad_stores cli/test_urls "
-        "cli/test_buckets cli/test_rig_pairs files/recordings/test_bags"
+        "cli/test_buckets cli/test_rig_pairs files/recordings/test_bags files/recordings/test_video"
     ),
     "simulate": (
         "cli/test_recorded cli/test_mistakes cli/test_simulate cli/test_outputs cli/test_lost_readers "
