@@ -182,11 +182,11 @@ def _look(trace: Trace, scale: float) -> dict[str, Any]:
     return {
         "color": paint,
         "linestyle": _LINES.get(line.get("dash", ""), "-") if lines else "none",
-        "linewidth": line.get("width", 2) * scale if lines else 0,
+        "linewidth": line["width"] * scale if lines else 0,
         "marker": _MARKS.get(symbol, "o") if marks else "",
         "markersize": size,
         "markerfacecolor": "none" if is_open else paint,
-        "markeredgewidth": marker.get("line", {}).get("width", 2) * scale if is_open else 0,
+        "markeredgewidth": marker["line"]["width"] * scale if is_open else 0,
     }
 
 
