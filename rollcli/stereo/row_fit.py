@@ -70,9 +70,11 @@ class BeliefTuning:
     has_left : float
         How often rows are turned since the left camera is rolled against the baseline, and not the right one.
         At 0.1, right views of empty roads that are turned and larger are off by up to 0.26 degrees, not 0.05.
-    may_scale, may_tilt, may_bend, may_skew, may_left : float
-        The same as the interval has it. Where the rows cannot tell two causes apart, it reaches both of them;
-        0.35 makes twice the standard deviation of a scale all of it, where a tilt is as likely as a bend.
+    may_scale, may_other, may_skew, may_left : float
+        The same as the interval has it; `may_other` of a tilt and of a bend. Where the rows cannot tell two
+        causes apart, it reaches both of them: 0.35 makes twice the standard deviation of a scale all of it.
+        With tilts at 0.1, intervals of 41 real roads with nothing above them cover 0.76 in place of 0.90, and
+        80 in place of 105 of 216 warped empty roads with much noise are suspect.
     least : float
         What no pair tells of a scale or, in px at the border, of a twist: blocks share a part of their error.
     tiles : float
@@ -97,8 +99,7 @@ class BeliefTuning:
     no_shape: float = 0.02
     has_left: float = 0.01
     may_scale: float = 0.5
-    may_tilt: float = 0.1
-    may_bend: float = 0.35
+    may_other: float = 0.35
     may_skew: float = 0.3
     may_left: float = 0.1
     least: float = 0.0001
@@ -400,7 +401,7 @@ def _mean_over_causes(
         Of the rows, radians: a left camera that is rolled has as large a tilt, and a right one none.
     """
     has = np.array([BELIEF.has_scale, BELIEF.has_tilt, BELIEF.has_bend])
-    may = np.array([BELIEF.may_scale, BELIEF.may_tilt, BELIEF.may_bend])
+    may = np.array([BELIEF.may_scale, BELIEF.may_other, BELIEF.may_other])
     causes = np.array(list(product((False, True), repeat=3)))
     prior = np.zeros((len(causes), 4))
     prior[:, :3] = causes * np.square([BELIEF.scale, BELIEF.tilt, BELIEF.bend])
