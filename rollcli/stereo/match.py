@@ -115,7 +115,7 @@ _FURTHEST = 12.0, 0.03, 0.02  # offset, rotation and scale that no rig in use ha
 NOT_LEVELLED = "the views are not level, and could not be levelled, as where they are not rectified"
 TOO_LITTLE = "too little can be compared to tell whether the views are level"
 NOT_TOLD_BY_ROWS = (
-    f"the rows do not tell whether the right view is larger or its rows are bent: {RECALIBRATE}"
+    f"the rows do not tell whether the right view is larger, bent or of another moment: {RECALIBRATE}"
 )
 PITCH_NOT_TOLD = (
     f"the rows do not tell whether the right camera is pitched or its image shifted: {RECALIBRATE}"

@@ -126,6 +126,8 @@ class ColumnEvidence:
         Variance of what the lens leaves at the border, px^2.
     shapes, shape_variances : ndarray, shape (4,)
         Of second and third degree at the border, px, px^2.
+    moved : float
+        Slope along the rows, px per px, that is surely on the road if the rig has moved between the views.
     reach : ndarray, shape (2,)
         How far from the centre blocks were seen, along the rows and down the columns, px.
     shape : tuple of int
@@ -143,6 +145,7 @@ class ColumnEvidence:
     unevenness: float
     shapes: Floats
     shape_variances: Floats
+    moved: float
     reach: Floats
     shape: tuple[int, int]
     factor: float
@@ -165,6 +168,7 @@ class ColumnEvidence:
             unevenness=float(np.mean([each.unevenness for each in pairs])),
             shapes=np.average([each.shapes for each in pairs], axis=0, weights=sures),
             shape_variances=np.mean([each.shape_variances for each in pairs], axis=0),
+            moved=float(np.mean([each.moved for each in pairs])),
             reach=np.mean([each.reach for each in pairs], axis=0),
             shape=pairs[0].shape,
             factor=pairs[0].factor,
@@ -305,10 +309,25 @@ def column_evidence(rows: MeasuredRows, spread: float) -> ColumnEvidence:
         unevenness=max(0.0, float(beyond.mean())),
         shapes=whole.values[7:],
         shape_variances=variance / BELIEF.tiles**2 * np.diag(whole.inverse)[7:],
+        moved=_moved(frame, seen, shift, fixed, fit.spread),
         reach=np.array([x, y]),
         shape=shape,
         factor=factor,
     )
+
+
+def _moved(frame: "_Frame", seen: SeenBlocks, shift: Floats, fixed: Floats, spread: float) -> float:
+    """Return the slope along the rows that a road surely has since the rig has moved between its views.
+
+    Px per px. Near things lie further outward in the later view: by y d in the rows and by x d in the
+    columns, times one factor. On the road that is a slope of this factor times its disparity.
+    """
+    design = np.stack([*frame.shapes[:7], frame.design[2] * frame.design[4]])
+    fit = _settled(_least_squares(design, shift, fixed), design, shift, fixed, spread)
+    error = _SURELY * math.sqrt(_variance(design, fit, frame.tile) * float(fit.inverse[7, 7]))
+    near = float(seen.near[seen.y > 0].mean()) if (seen.y > 0).any() else 0.0
+    surely = max(0.0, abs(float(fit.values[7])) - error)
+    return surely * near / (frame.half_height * frame.near)
 
 
 def column_support(seen: ColumnEvidence, axis: Sequence[float] = (0.0, 0.0)) -> ColumnSupport:
@@ -337,7 +356,7 @@ def column_support(seen: ColumnEvidence, axis: Sequence[float] = (0.0, 0.0)) -> 
     ratio = float(np.sqrt(np.prod(even / curved)) * better)
     error = lens / (x * y) ** 2 + seen.twist_variance
     twist, twist_error = _yaw_of_twist(seen.twist, error, yaw, skew, ratio)
-    parts = scale[1], 2 * twist_error * height * _ROAD_ACROSS, pitch[1] * height * _ROAD_DOWN
+    parts = scale[1], 2 * twist_error * height * _ROAD_ACROSS, pitch[1] * height * _ROAD_DOWN, seen.moved
     open_slope = float(np.linalg.norm(parts))
     larger = scale[0] - 2 * twist * right - pitch[0] * below
     return ColumnSupport(larger, twist, pitch[0], open_slope, parts[2]).resized(seen.factor)

@@ -253,6 +253,14 @@ def test_rows_that_are_skewed_alone_are_in_the_error():
     assert found.error > 2 * level.error
 
 
+@pytest.mark.parametrize("way", [-0.03, 0.03])
+def test_what_a_rig_moves_on_by_between_its_views_is_in_the_error(way):
+    factor = way / (720 * 0.54)  # over focal length and baseline: it moves points by (x, y) times d
+    found = support_of(lambda x, y, near: factor * y * near)
+    lane = 0.32 * 100  # px: the road's disparity half way down to the lower edge
+    assert 1.96 * found.error > abs(factor) * lane > 10 * support_of(lambda x, y, near: 0 * x).error
+
+
 def test_an_even_twist_is_a_yaw_and_an_uneven_one_mostly_a_lens():
     yaw = np.radians(0.2) / 720
     even = support_of(lambda x, y, near: yaw * x * y)
