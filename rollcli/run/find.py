@@ -429,15 +429,15 @@ def _frame_maker(options: FramesOptions) -> Callable[..., Frame]:
     """Return what makes frames, with the masks and calibrations that were named: one, or one of each stem."""
     mask_of = mask_finder(options.region.mask)
     calibration_of = cache(lambda: calibration_finder(options.calibration))  # not where bags have their own
+    doffs = options.calibration.doffs
     # doffs would take all that is farther than fB / doffs from a map that is computed of depths
     of_depths = options.encoding.encoding == "depth" and not options.paired
-    given = options.calibration.doffs is not None
 
     def frame(left: Input, right: Input | None = None, calibration: Calibration | None = None) -> Frame:
         # what is made of an input must stay in its folder, whatever a store or an archive calls it
         foreign = is_url(left.location) or file_of(left.location) != left.location
         known = calibration or calibration_of()(left.name)
-        if known and known.doffs and (of_depths or (not given and has_doffs(left.location))):
+        if known and known.doffs and (of_depths or (doffs is None and has_doffs(left.location))):
             known = replace(known, doffs=0.0)
         return Frame(
             file=left.name,

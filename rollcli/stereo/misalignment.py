@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 _SAME = 2.0**-10  # px: two misalignments that differ by less anywhere are one
 _NEAR = 1 / 16  # of the width of a view: the disparity of what is near, where a shift by a tilt is told
-
+# what to do about views that are not level: of several pairs, `rig` tells what none of them does
 RECALIBRATE = "recalibrate, or give --align the file that `rig --correction` writes"
 
 

@@ -309,20 +309,23 @@ def column_evidence(rows: MeasuredRows, spread: float) -> ColumnEvidence:
         unevenness=max(0.0, float(beyond.mean())),
         shapes=whole.values[7:],
         shape_variances=variance / BELIEF.tiles**2 * np.diag(whole.inverse)[7:],
-        moved=_moved(frame, seen, shift, fixed, fit.spread),
+        moved=_moved(design[:7], seen, frame, shift, fixed, fit.spread),
         reach=np.array([x, y]),
         shape=shape,
         factor=factor,
     )
 
 
-def _moved(frame: "_Frame", seen: SeenBlocks, shift: Floats, fixed: Floats, spread: float) -> float:
+def _moved(
+    still: Floats, seen: SeenBlocks, frame: "_Frame", shift: Floats, fixed: Floats, spread: float
+) -> float:
     """Return the slope along the rows that a road surely has since the rig has moved between its views.
 
     Px per px. Near things lie further outward in the later view: by y d in the rows and by x d in the
-    columns, times one factor. On the road that is a slope of this factor times its disparity.
+    columns, times one factor. On the road that is a slope of this factor times its disparity. `still` is the
+    design of a rig that has not moved.
     """
-    design = np.stack([*frame.shapes[:7], frame.design[2] * frame.design[4]])
+    design = np.vstack([still, frame.design[2] * frame.design[4]])
     fit = _settled(_least_squares(design, shift, fixed), design, shift, fixed, spread)
     error = _SURELY * math.sqrt(_variance(design, fit, frame.tile) * float(fit.inverse[7, 7]))
     near = float(seen.near[seen.y > 0].mean()) if (seen.y > 0).any() else 0.0

@@ -176,8 +176,8 @@ def parse_yaml(file: File) -> dict[str, Value]:
 
     ROS, Kalibr, ORB-SLAM and OpenCV write it; PyYAML parses it. What they have no use for is refused as soon
     as the parser meets it: anchors and aliases, which can make a few lines fill the memory, and tags, which
-    name objects. What follows the end of the first document is left alone unless
-    OpenCV appended it; numbers stay the text they are.
+    name objects. What follows the end of the first document is left alone unless OpenCV appended it; numbers
+    stay the text they are.
 
     Raises
     ------
