@@ -17,28 +17,27 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from bench_level import warped
 from bench_lidar import FOCAL, LIDAR, Image
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from rollcli.files.formats import read_image
-from tests.odd_views import seen_turned
+from tests.odd_views import seen_by, seen_turned
 from tests.run_cli import command, environment
 
 WAYS: dict[str, Callable[[Image], Image]] = {
     "as they are": lambda view: view,
-    "0.1 % larger": partial(warped, clockwise_deg=0.0, larger=0.001, lower=0.0),
-    "0.3 % larger": partial(warped, clockwise_deg=0.0, larger=0.003, lower=0.0),
-    "0.4 % smaller": partial(warped, clockwise_deg=0.0, larger=-0.004, lower=0.0),
+    "0.1 % larger": partial(seen_by, larger_percent=0.1),
+    "0.3 % larger": partial(seen_by, larger_percent=0.3),
+    "0.4 % smaller": partial(seen_by, larger_percent=-0.4),
     "turned by 0.1°, 0.1 % smaller, 0.5 px lower": partial(
-        warped, clockwise_deg=0.1, larger=-0.001, lower=0.5
+        seen_by, clockwise_deg=0.1, larger_percent=-0.1, lower=0.5
     ),
     "turned by -0.3°, 0.2 % larger, 1 px higher": partial(
-        warped, clockwise_deg=-0.3, larger=0.002, lower=-1.0
+        seen_by, clockwise_deg=-0.3, larger_percent=0.2, lower=-1.0
     ),
     "turned by 0.5°, 0.6 % smaller, 2 px higher": partial(
-        warped, clockwise_deg=0.5, larger=-0.006, lower=-2.0
+        seen_by, clockwise_deg=0.5, larger_percent=-0.6, lower=-2.0
     ),
     **{
         f"{way} of {degrees:+.1f}°": partial(seen_turned, focal=FOCAL, **{f"{way}_deg": degrees})

@@ -37,26 +37,26 @@ from rollcli.stereo.correction import Correction
 from rollcli.stereo.match import StereoMatch
 from rollcli.stereo.misalignment import LEVEL, NO_SUPPORT, Misalignment
 from rollcli.stereo.options import StereoOptions
-from tests.odd_views import seen_turned
+from tests.odd_views import seen_by, seen_turned
 
 STREETS = Path(__file__).parents[3] / "shared" / "streets"
 SEED = 812
 SIZES = {1: (640, 480), 2: (1242, 375)}  # by the part of the pairs that has it
-WAYS = [  # degrees clockwise, share larger, pixels lower
+WAYS = [  # degrees clockwise, per cent larger, pixels lower
     (0.3, 0.0, 0.0),
     (-0.8, 0.0, 0.0),
-    (0.0, 0.002, 0.0),
-    (0.0, -0.004, 0.0),
-    (0.0, 0.008, 0.0),
-    (0.0, 0.0005, 0.0),
+    (0.0, 0.2, 0.0),
+    (0.0, -0.4, 0.0),
+    (0.0, 0.8, 0.0),
+    (0.0, 0.05, 0.0),
     (0.0, 0.0, 0.4),
     (0.0, 0.0, -4.0),
-    (0.1, -0.001, 0.5),
-    (-0.8, 0.008, 4.0),
-    (0.8, 0.008, -4.0),
-    (0.5, -0.006, -2.0),
+    (0.1, -0.1, 0.5),
+    (-0.8, 0.8, 4.0),
+    (0.8, 0.8, -4.0),
+    (0.5, -0.6, -2.0),
 ]
-SLIGHTLY_LARGER, SLIGHT_YAWS_DEG = (0.0002, -0.0003), (0.03, -0.05)  # most of them count as level
+SLIGHTLY_LARGER, SLIGHT_YAWS_DEG = (0.02, -0.03), (0.03, -0.05)  # most of them count as level
 YAWS_DEG, PITCHES_DEG, BENDS, LEFT_DEG = (0.1, -0.3), (0.1, 0.3), (0.002, -0.002), (0.3, -0.3)
 GOOD_DEG = 0.1
 NOISE = 4.0  # grey levels; the renderer's default is 1.5
@@ -102,9 +102,9 @@ def report(kind: str, pairs: list[Views]) -> None:
     known = [(pair, theta) for pair, _, theta in found]
     print(f"{kind}: {len(pairs)} pairs, {corrected} corrected untouched; {len(known)} to compare with")
     ways = {
-        "turned, larger, lower": [partial(warped, clockwise_deg=a, larger=b, lower=c) for a, b, c in WAYS],
+        "turned, larger, lower": [partial(askew, way=way) for way in WAYS],
         "nearly level": [
-            *(partial(warped, clockwise_deg=0.0, larger=each, lower=0.0) for each in SLIGHTLY_LARGER),
+            *(partial(seen_by, larger_percent=each) for each in SLIGHTLY_LARGER),
             *(partial(seen_turned, yaw_deg=each) for each in SLIGHT_YAWS_DEG),
         ],
         "yaw": [partial(seen_turned, yaw_deg=each) for each in YAWS_DEG],
@@ -123,19 +123,25 @@ def report(kind: str, pairs: list[Views]) -> None:
 def told(pair: Views, level: StereoMatch) -> Iterator[tuple[Views, float, StereoOptions]]:
     """Warp the right view in all ways, each with a correction that says so, and the angle without a warp."""
 
-    def options(clockwise_deg: float = 0.0, larger: float = 0.0, lower: float = 0.0) -> StereoOptions:
-        lies = level.corrected + Misalignment(lower, math.radians(clockwise_deg), larger)
-        columns = replace(NO_SUPPORT, scale=level.larger + larger)
+    def options(clockwise_deg: float = 0.0, percent: float = 0.0, lower: float = 0.0) -> StereoOptions:
+        lies = level.corrected + Misalignment(lower, math.radians(clockwise_deg), percent / 100)
+        columns = replace(NO_SUPPORT, scale=level.larger + percent / 100)
         return StereoOptions(align=Correction(lies, columns, 0.0, *level.disparity.shape[::-1]))
 
     theta = estimate_of(match_as_estimated(pair.left, pair.right, options())).theta
     for way in WAYS:
-        yield pair._replace(right=warped(pair.right, *way)), theta, options(*way)
+        yield pair._replace(right=askew(pair.right, way)), theta, options(*way)
+
+
+def askew(view: NDArray[Any], way: tuple[float, float, float]) -> NDArray[Any]:
+    """Return what an odd camera sees, in one of `WAYS`."""
+    clockwise_deg, percent, lower = way
+    return seen_by(view, clockwise_deg=clockwise_deg, larger_percent=percent, lower=lower)
 
 
 def turned(pair: Views, theta: float, clockwise_deg: float) -> tuple[Views, float]:
     """Turn the left view alone, as a camera that is rolled against the baseline, and its roll with it."""
-    left, more = warped(pair.left, clockwise_deg, 0.0, 0.0), math.radians(clockwise_deg)
+    left, more = seen_by(pair.left, clockwise_deg=clockwise_deg), math.radians(clockwise_deg)
     return Views(left, pair.right, pair.roll + more), theta + more
 
 
@@ -162,15 +168,6 @@ def report_ways(kind: str, pairs: Sequence[tuple[Views, float] | tuple[Views, fl
     above = np.sum(np.array(off) > GOOD_DEG)
     covered = "" if math.isnan(pairs[0][0].roll) else f"; the interval covers {np.mean(reached):.2f}"
     print(f"{above} of {len(off)} above {GOOD_DEG}; {doubted} doubted or refused{covered}")
-
-
-def warped(view: NDArray[Any], clockwise_deg: float, larger: float, lower: float) -> NDArray[Any]:
-    """What a camera sees that is turned, nearer and lower."""
-    height, width = view.shape[:2]
-    matrix = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), -clockwise_deg, 1 + larger)
-    matrix[1, 2] += lower
-    size = width, height
-    return cv2.warpAffine(view, matrix, size, flags=cv2.INTER_LANCZOS4, borderMode=cv2.BORDER_REFLECT)
 
 
 def bent(view: NDArray[Any], share: float) -> NDArray[Any]:
