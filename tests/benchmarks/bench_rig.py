@@ -23,7 +23,7 @@ import numpy as np
 
 from rollcli.files.results import Row, format_header, format_row
 from rollcli.rig.drive.quantity import assess_sequence
-from tests.rig.drive.series import ar1, drive
+from tests.rig.drive.series import ar1, drive, swaying
 from tests.run_cli import command, environment
 
 SERIES, FIRST_SEED, ROWS = 500, 100_000, 1_000_000
@@ -118,6 +118,17 @@ def short_drives(series: int, first: int) -> None:
             row.append(f"{np.mean(held):.2f} {np.median(halves):.3f}")
         print(f"{frames:4}  " + "  ".join(row), flush=True)
     print(f"pooled {np.mean(inside):.3f}", flush=True)
+    print("a smooth sway of 40 frames, 0.3 degrees: share inside, and of drifts whose interval leaves out 0")
+    for frames in SHORT[:3]:
+        held, drifts = [], []
+        for seed in range(first, first + series):
+            rng = np.random.default_rng([seed, frames])
+            values = swaying(rng, frames, 40, 0.97, 0.3) + rng.normal(0, 0.05, frames)
+            found = assess_sequence(values, np.full(frames, 0.05))
+            if found.drift.ci95 is not None and found.segments[-1].mean.ci95 is not None:
+                held.append(abs(found.segments[-1].mean.value) <= found.segments[-1].mean.ci95)
+                drifts.append(abs(found.drift.value) > found.drift.ci95)
+        print(f"{frames:4}  {np.mean(held):.2f}  {np.mean(drifts):.2f}", flush=True)
 
 
 def assess_a_million() -> str:
