@@ -68,7 +68,7 @@ def make_plan(options: EstimateOptions) -> Plan:
     )
     every, frames = frames, _shard(frames, options.result)
     outputs.check_places(frames, options.folders)
-    further = further_columns(every, check_first_size(every, options), options)
+    further = _further_columns(every, check_first_size(every, options), options)
     if not (options.running.overwrite or options.result.resume):
         outputs.check_nothing_is_there(outputs.files_of(frames, options.writes))
     if plan.format == "parquet" and is_stream(plan.output):
@@ -92,7 +92,7 @@ def _check_start(options: EstimateOptions) -> None:
         raise UsageError("--disparity writes maps computed from --left and --right; here maps are the input")
 
 
-def further_columns(
+def _further_columns(
     frames: Sequence[Frame], first: Calibration | None, options: EstimateOptions
 ) -> tuple[str, ...]:
     """List the columns that the result has beside those of every result; shards of a run have the same.

@@ -266,8 +266,6 @@ def _parsed(data: bytes, plan: Plan) -> tuple[KeptRows, bytes, bytes]:
     if not data:
         return kept, b"", b""
     update = plan.options.result.update
-    if not (update or data.startswith(results.format_header(plan.format, plan.further))):
-        kept.mismatch = "the columns are others, since fx and fy of a frame differ"  # of any shard's
     inputs = Inputs(data_of(inputs_path(plan.output)), updates=update)
     try:
         if update:

@@ -37,7 +37,7 @@ from rollcli.run.options import (
     PairOptions,
     RegionOptions,
 )
-from rollcli.run.plan import Plan, further_columns
+from rollcli.run.plan import Plan
 from rollcli.run.progress import RunSummary
 from rollcli.run.result_file import Inputs, data_of
 from rollcli.stereo.correction import Correction
@@ -67,6 +67,7 @@ CONVENTIONS = {
     "image_roll_deg where there is one, else roll_deg",
 }
 
+_FURTHER = "further_columns"  # beside those of every result
 _REPLACES = "replaces_images"  # while a run with --overwrite is not over
 _NUMBERS = ("scale", "num_disparities", "vertical_offset")  # options that are None by default
 Options = TypeVar("Options", EncodingOptions, ImageOptions, MethodOptions, RegionOptions, StereoOptions)
@@ -127,6 +128,7 @@ class RunRecord:
         self.check_owned()
         record = {
             **self.fixed,
+            _FURTHER: list(self.plan.further),
             "encoding": sorted(self.read_as.encodings),
             "disparities_searched_px": list(self.read_as.searched or ()),
             **({"downscale": self.read_as.downscale} if self.read_as.downscale > 1 else {}),
@@ -569,9 +571,10 @@ def _differences(kept: KeptRows, was: Mapping[str, Any] | None, record: RunRecor
     again = "; --update does again what has changed" if updates else ""
     if was.get("calibration") != json.loads(json.dumps(now.get("calibration"))):
         yield f"the calibration differs{again}"
-    asked = plan.options
-    if further_columns(frames, None, asked) != further_columns(plan.frames, None, asked):
-        yield f"a new frame's fx and fy differ, which adds a column{'; --update does' if updates else ''}"
+    columns = list(plan.further)
+    if was.get(_FURTHER, columns) != columns:  # those of any shard's frames; earlier records have none
+        adds = "differ, which adds" if results.IMAGE_ROLL in columns else "no longer differ, which drops"
+        yield f"fx and fy of a frame {adds} a column{'; --update does so' if updates else ''}"
     hint = "; --update leaves out the rows of frames that are gone" if updates else ""
     if grown:
         hint = f"; new frames must sort last{', or be added by --update' if updates else ''}"
