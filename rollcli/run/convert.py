@@ -102,7 +102,8 @@ def _find_rows(frames: Sequence[Frame], options: ConvertOptions) -> Sequence[Row
         return [None] * len(frames)
     rows = _rows_of(frames, options.result, options)
     posed = (frame for frame, row in zip(frames, rows, strict=True) if row.pitch_deg is not None)
-    if isinstance(options, HeightsOptions) and any(frame.calibration is None for frame in posed):
+    lacks = any(frame.calibration is None and not frame.damaged for frame in posed)
+    if isinstance(options, HeightsOptions) and lacks:
         options.running.note(
             f"{options.result}: was made with a calibration: give it with --calib; without it heights are in "
             "camera heights, and off with a doffs, or where camber meets a principal point beside the middle"

@@ -93,7 +93,7 @@ def calibration_finder(given: CalibrationOptions) -> Callable[[str], Calibration
     """Return what finds the calibration of a frame by its name: what a user said of it is found and read.
 
     One is for all frames; of a folder it is that of the frame's stem, or of the stem up to one of its
-    underscores.
+    underscores. What finds it raises InputError where the frame's own file is damaged.
 
     Raises
     ------
@@ -106,7 +106,13 @@ def calibration_finder(given: CalibrationOptions) -> Callable[[str], Calibration
     files = _files(given.calib[0])
     by_stem = gathered((_stem(shown(path)).removesuffix(_MARK), path) for path in files)
     fetched = fetch_all(filter(is_url, files), MAX_BYTES)  # one after the other takes long
-    read = cache(lambda path: _read([path], given, fetched))  # one may be for a thousand frames
+
+    @cache  # one may be for a thousand frames
+    def read(path: str) -> Calibration:
+        try:
+            return _read([path], given, fetched)
+        except UsageError as error:  # which is of its own frames alone
+            raise InputError(str(error)) from error
 
     def of(name: str) -> Calibration | None:
         if _is_broken(name):
@@ -180,9 +186,13 @@ def check_first_size(frames: Sequence[Frame], options: FramesOptions) -> Calibra
     Raises
     ------
     UsageError
-        So it is; or views side by side seem squeezed, and no calibration says that they are not.
+        So it is; or every calibration is damaged; or views side by side seem squeezed, and no calibration
+        says that they are not.
     """
-    layout, tried = options.pairs.side_by_side, frames[:_TRIED]
+    sound = (frame for frame in frames if not frame.damaged)
+    layout, tried = options.pairs.side_by_side, list(itertools.islice(sound, _TRIED))
+    if not tried:
+        raise UsageError(frames[0].damaged)
     if layout is None and all(frame.calibration is None for frame in tried):
         return None
     from rollcli.run.read import read_map, read_views, size_of_images  # only here are images decoded
@@ -221,7 +231,7 @@ def check_depth(frames: Sequence[Frame], options: FramesOptions) -> None:
     ------
     UsageError
     """
-    used = (frame.calibration for frame in frames if not _is_broken(frame.file))
+    used = (frame.calibration for frame in frames if not (_is_broken(frame.file) or frame.damaged))
     lacking = (calibration is None or calibration.baseline is None for calibration in used)
     if options.encoding.encoding == "depth" and not options.paired and any(lacking):
         raise UsageError(
@@ -436,7 +446,13 @@ def _frame_maker(options: FramesOptions) -> Callable[..., Frame]:
     def frame(left: Input, right: Input | None = None, calibration: Calibration | None = None) -> Frame:
         # what is made of an input must stay in its folder, whatever a store or an archive calls it
         foreign = is_url(left.location) or file_of(left.location) != left.location
-        known = calibration or calibration_of()(left.name)
+        known, damaged = calibration, ""
+        if known is None:
+            find = calibration_of()  # a file that is for all frames is refused
+            try:
+                known = find(left.name)
+            except InputError as error:
+                damaged = str(error)
         if known and known.doffs and (of_depths or (doffs is None and has_doffs(left.location))):
             known = replace(known, doffs=0.0)
         return Frame(
@@ -447,6 +463,7 @@ def _frame_maker(options: FramesOptions) -> Callable[..., Frame]:
             relative=left.relative if not foreign or names_a_file(left.relative) else "",
             mask=mask_of(left.name),
             calibration=known,
+            damaged=damaged,
         )
 
     return frame

@@ -37,6 +37,8 @@ class Frame(NamedTuple):
         Its own in the result that a conversion is given.
     decoded : Decoded or None
         Its views, where they were read before it was handed out.
+    damaged : str
+        What is wrong with the file of its calibration, which cannot be read; empty otherwise.
     """
 
     file: str
@@ -48,6 +50,7 @@ class Frame(NamedTuple):
     calibration: Calibration | None = None
     row: Row | None = None
     decoded: "Decoded | None" = None
+    damaged: str = ""
 
     def reads(self) -> Iterator[str]:
         """Yield every file that this frame needs."""

@@ -219,13 +219,15 @@ def read_source(frame: Frame, options: FramesOptions) -> Source:
     Raises
     ------
     InputError
-        A file cannot be read as what it should be, or no pixel may be used.
+        A file cannot be read as what it should be, also that of its calibration; or no pixel may be used.
     """
     if not frame.relative:
         raise InputError(
             f"{frame.file}: its name in the store or archive names no file below a folder, by which "
             "what is made of it could be named"
         )
+    if frame.damaged:
+        raise InputError(frame.damaged)
     if frame.right_file:
         return _match(frame, options)
     source = _read(frame, options)
