@@ -14,8 +14,7 @@ from rollcli.run.options import EstimateOptions
 from rollcli.run.outputs import every_path, list_files
 from rollcli.run.plan import Plan, make_plan
 from rollcli.run.progress import Progress
-from rollcli.run.result import kept_of, open_output
-from rollcli.run.resume import Output
+from rollcli.run.result import Output, kept_of, open_output
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
 from rollcli.run.workers.tasks import require_scheduler, run_joined
 

@@ -13,14 +13,16 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import chain, islice
+from pathlib import Path
 
-from rollcli.errors import InputError, UsageError
+from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.extras import require_extra
 from rollcli.files import results
-from rollcli.files.atomic import is_file, is_folder, is_there, remove_leftovers
+from rollcli.files.atomic import is_file, is_folder, is_there, remove_leftovers, sync_files
 from rollcli.files.locking import exists_already, locked_folder, not_resumable
 from rollcli.files.storage import is_stream, list_names, open_stream, read_bytes, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url, public_name
+from rollcli.run import outputs
 from rollcli.run.batch import Batch, BatchOptions, Step
 from rollcli.run.frame import Frame
 from rollcli.run.options import EstimateOptions
@@ -42,13 +44,88 @@ from rollcli.run.result_file import (
 )
 from rollcli.run.resume import (
     KeptRows,
-    Output,
     RunRecord,
     arranged,
     checked_record,
     is_replaceable_record,
     new_record,
 )
+
+
+class Output:
+    """Where the rows of a run go: a stream, a file or a folder of parts.
+
+    Attributes
+    ----------
+    record : RunRecord
+        FILE.run.json.
+    kept : KeptRows
+        What is known of the rows of an interrupted run, which is resumed.
+    """
+
+    def __init__(self, record: RunRecord, kept: KeptRows) -> None:
+        self.record, self.kept, self._plan = record, kept, record.plan
+        self._rows_there = kept.count - len(kept.holes)
+        # what takes the place of kept rows, by their positions, and of the lines of their inputs
+        self._new_rows: dict[int, bytes] = {}
+        self._new_notes: dict[int, bytes] = {}
+        self._images: list[str] = []  # which must be on the disk before the rows that come next
+        self._folders: set[Path] = set()  # whose names are on the disk
+
+    def rows_of(self, step: Step, told: EstimateOptions) -> BatchOptions:
+        """Say what workers are told of the rows of a step."""
+        return BatchOptions(told, self._plan.further)
+
+    def append(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
+        """Add the rows of these positions, which may wait for others."""
+
+    def commit(self) -> None:
+        """Force to the disk what was added: what a stream was given has left this process."""
+
+    def finish(self, summary: RunSummary) -> None:
+        """Write the summary into the record."""
+        self.record.write(summary)
+
+    def hint(self) -> str:
+        """Say that --resume continues, if rows are kept; a stream keeps none."""
+        return f"; {self._rows_there} rows are kept, continue with --resume" if self._rows_there else ""
+
+    def restore(self, frames: Sequence[Frame], batch: Batch) -> None:
+        """Take the images of incomplete frames, which were made again.
+
+        Raises
+        ------
+        OutputError
+            They could not be made: a row no longer holds.
+        """
+        for row in (result.row for result in batch.told):
+            if row.status == "error":
+                raise OutputError(f"the images of {row.file} cannot be made again: {row.message}")
+        self._take_images(frames, batch.figures.status)
+
+    def replace(self, positions: Sequence[int], frames: Sequence[Frame], batch: Batch) -> None:
+        """Take rows in the place of kept ones, and their images; positions increase.
+
+        `commit` writes them all at once.
+        """
+        self._new_rows.update(zip(positions, batch.lines, strict=True))
+        self._new_notes.update(zip(positions, batch.notes, strict=True))
+        self._take_images(frames, batch.figures.status)
+
+    def _take_images(self, frames: Sequence[Frame], status: bytes) -> None:
+        self._images += outputs.local_files(frames, status, self._plan.options.writes)
+
+    def _sync_images(self) -> None:
+        """Force the images to the disk."""
+        if self._images:
+            sync_files(self._images, self._folders)
+            self._images.clear()
+
+    def _end_replacing(self) -> None:
+        """Forget the rows that are written, and what told their images from those of other programs."""
+        outputs.remove_marks([self._plan.frames[at] for at in self._new_rows], self._plan.options.writes)
+        self._new_rows.clear()
+        self._new_notes.clear()
 
 
 class StreamOutput(Output):
