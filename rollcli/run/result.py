@@ -42,14 +42,7 @@ from rollcli.run.result_file import (
     row_lines,
     split_lines,
 )
-from rollcli.run.resume import (
-    KeptRows,
-    RunRecord,
-    arranged,
-    checked_record,
-    is_replaceable_record,
-    new_record,
-)
+from rollcli.run.resume import KeptRows, RunRecord, arranged, is_replaceable_record, new_record
 
 
 class Output:
@@ -326,7 +319,7 @@ def kept_of(plan: Plan) -> KeptRows:
     else:
         _check_permitted(plan)
         kept, *_ = _parsed(data_of(plan.output) if plan.options.result.resume else b"", plan)
-    checked_record(plan, kept, parts)
+    new_record(plan, kept, parts)
     return kept
 
 
@@ -359,6 +352,7 @@ def _parsed(data: bytes, plan: Plan) -> tuple[KeptRows, bytes, bytes]:
 def _begin(file: ResultFile, inputs: ResultFile, plan: Plan) -> FileOutput:
     kept, rows, lines = _parsed(file.read() if plan.options.result.resume else b"", plan)
     record = new_record(plan, kept)
+    _clear_images(plan, kept)
     remove_leftovers(chain(plan.files, map(os.path.realpath, plan.files)))
     # in this order, a run that is killed in between can be resumed: an empty file counts as a new one, and a
     # row without its line for nothing
@@ -394,6 +388,7 @@ def _begin_parts(plan: Plan) -> PartsOutput:
     parts = _check_parts(plan)
     kept, renewed = _kept_parts(plan, parts)
     record = new_record(plan, kept, parts)
+    _clear_images(plan, kept)
     _remove_leftovers(plan, parts)
     rows = plan.options.result.part_rows
     whole = set(range(_whole_parts(kept.count, rows))).difference(at // rows for at in kept.holes)
@@ -409,6 +404,12 @@ def _begin_parts(plan: Plan) -> PartsOutput:
     for path, lines in renewed.items():
         write_bytes(path, lines, durable=True)
     return PartsOutput(record, kept)
+
+
+def _clear_images(plan: Plan, kept: KeptRows) -> None:
+    """Remove what killed workers left beside the images."""
+    if plan.options.result.resume or plan.options.running.overwrite:
+        remove_leftovers(outputs.files_of(kept.not_failed(), plan.options.writes))
 
 
 def _remove_leftovers(plan: Plan, parts: Sequence[str] = ()) -> None:

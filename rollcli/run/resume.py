@@ -18,7 +18,6 @@ from typing import Any, TypeVar, get_args
 from rollcli import __version__
 from rollcli.errors import InputError
 from rollcli.files import results
-from rollcli.files.atomic import remove_leftovers
 from rollcli.files.locking import differences, not_resumable
 from rollcli.files.storage import write_bytes
 from rollcli.files.stores.locations import base_name, public_name
@@ -441,22 +440,13 @@ def _key(of: results.Row | Frame) -> int:
 def new_record(plan: Plan, kept: KeptRows, parts: Sequence[str] = ()) -> RunRecord:
     """Make the record of a run, which continues that of an interrupted run where rows are kept.
 
-    What killed workers left beside the images is removed. Of a run with larger parts none of the `parts` that
-    are there is kept, and yet they hold rows.
+    Of a run with larger parts none of the `parts` that are there is kept, and yet they hold rows.
 
     Raises
     ------
     UsageError
         It cannot be continued; says what differs. Or it is a first start, and there are images already.
     """
-    record, options = checked_record(plan, kept, parts), plan.options
-    if options.result.resume or options.running.overwrite:
-        remove_leftovers(outputs.files_of(kept.not_failed(), options.writes))
-    return record
-
-
-def checked_record(plan: Plan, kept: KeptRows, parts: Sequence[str] = ()) -> RunRecord:
-    """Make that record, and change nothing; see `new_record`."""
     record, options = RunRecord(plan), plan.options
     if options.result.resume:
         try:
