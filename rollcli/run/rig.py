@@ -126,10 +126,12 @@ def _check_shards(parts: Sequence[Part], shards: Sequence[tuple[int, int]]) -> N
                 f"{first.path} and {(part if part is not first else parts[1]).path} are not shards of one "
                 "run: name all shards of one run, or results of whole runs"
             )
-        for name, *values in _different(first, part):
-            was, now = ("not given" if each is None else each for each in values)
-            names = f"{first.path} and {part.path}"
-            raise UsageError(f"{names} are not shards of one run: {name} was {was} and {now}")
+        made = [_made_with(each.run) for each in (first, part)]
+        for name in sorted({*made[0], *made[1]}):
+            was, now = ("not given" if each.get(name) is None else each[name] for each in made)
+            if was != now:
+                names = f"{first.path} and {part.path}"
+                raise UsageError(f"{names} are not shards of one run: {name} was {was} and {now}")
     indices = [index for index, _ in shards]
     twice = next((index for index in indices if indices.count(index) > 1), None)
     if twice is not None:
@@ -142,16 +144,10 @@ def _check_shards(parts: Sequence[Part], shards: Sequence[tuple[int, int]]) -> N
         )
 
 
-def _different(one: Part, other: Part) -> list[tuple[str, Any, Any]]:
-    """Options, shard aside, and versions that differ between two runs."""
-    options, others = _options(one.run), _options(other.run)
-    found = [
-        (f"--{name}", options.get(name), others.get(name))
-        for name in sorted({*options, *others} - {"shard"})
-        if options.get(name) != others.get(name)
-    ]
-    was, now = ((part.run or {}).get("rollcli") for part in (one, other))
-    return [*found, ("the version of rollcli", was, now)] if was != now else found
+def _made_with(run: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Options, shard aside, and the version of a run."""
+    options = {f"--{name}": value for name, value in _options(run).items() if name != "shard"}
+    return {**options, "the version of rollcli": (run or {}).get("rollcli")}
 
 
 def _options(run: Mapping[str, Any] | None) -> Mapping[str, Any]:
