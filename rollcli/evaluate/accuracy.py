@@ -116,11 +116,11 @@ def assess(rows: Sequence[Row], truth: Mapping[str, KnownPose], result_name: str
     UsageError
         No row matches a known angle, or two rows have the same stem.
     """
-    places = by_stem([row.file for row in rows], result_name)
-    if not places.keys() & truth.keys():
+    found = by_stem((result_name, row.file, row) for row in rows)
+    if not found.keys() & truth.keys():
         example = f": it holds {rows[0].file}, the truth {next(iter(truth))}" if rows else ": it is empty"
         raise UsageError(f"{result_name}: no row has the stem of a frame of the truth{example}")
-    known = [(rows[place], truth[stem]) for stem, place in places.items() if stem in truth]
+    known = [(row, truth[stem]) for stem, row in found.items() if stem in truth]
     rolls = [
         (row, row.roll_deg, (math.degrees(pose.theta), *pose.lane_deg), row.roll_ci95_deg)
         for row, pose in known
@@ -130,8 +130,8 @@ def assess(rows: Sequence[Row], truth: Mapping[str, KnownPose], result_name: str
         roll=_accuracy(rolls, period=180) or Accuracy(),
         ok=statuses.count("ok"),
         suspect=statuses.count("suspect"),
-        no_angle=tuple(s for s in truth if s not in places or rows[places[s]].roll_deg is None),
-        no_truth=tuple(rows[place].file for stem, place in places.items() if stem not in truth),
+        no_angle=tuple(s for s in truth if s not in found or found[s].roll_deg is None),
+        no_truth=tuple(row.file for stem, row in found.items() if stem not in truth),
         pitch=_accuracy([(row, row.pitch_deg, (pose.pitch_deg,), row.pitch_ci95_deg) for row, pose in known]),
         height=_accuracy([(row, row.height_m, (pose.height_m,), row.height_ci95_m) for row, pose in known]),
     )

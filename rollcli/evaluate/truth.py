@@ -3,9 +3,10 @@
 import csv
 import io
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files.bounded import as_utf8
@@ -15,7 +16,11 @@ from rollcli.files.storage import read_named
 
 _NEEDED = ("file", "roll_deg")
 _LANE = "lane_lo_deg", "lane_hi_deg"
-_READ = (*_NEEDED, *_LANE, "pitch_deg", "height_m", "curvature_per_m", "focal_px", "baseline_m")
+_LENGTHS = "height_m", "focal_px", "baseline_m"
+_READ = (*_NEEDED, *_LANE, "pitch_deg", "curvature_per_m", *_LENGTHS)
+_FORM = "known angles are a CSV with the columns file and roll_deg"
+
+Named = TypeVar("Named")
 
 
 @dataclass(frozen=True)
@@ -36,23 +41,27 @@ class KnownPose:
     lane_deg: tuple[float, ...] = ()
 
 
-def by_stem(names: Sequence[str], where: str) -> dict[str, int]:
-    """Return the place of each name by its stem.
+def by_stem(named: Iterable[tuple[str, str, Named]]) -> dict[str, Named]:
+    """Return what has a name by the stem of that; of each is told where it stands, its name, and what it is.
 
     Raises
     ------
     UsageError
-        Names two that have the same stem; `where` says where they are.
+        Names two that have the same stem, and where the second of them is.
     """
-    places: dict[str, int] = {}
-    for place, name in enumerate(names):
-        first = places.setdefault(stem_of(name), place)
-        if first != place:
+    names = dict[str, str]()
+    found = dict[str, Named]()
+    for where, name, each in named:
+        stem = stem_of(name)
+        if names.get(stem) == name:
+            raise UsageError(f"{where}: {name} is there a second time: leave one of them")
+        if stem in names:
             raise UsageError(
-                f"{where}: {names[first]} and {name} have the same stem, and frames are matched by it: "
+                f"{where}: {names[stem]} and {name} have the same stem, and frames are matched by it: "
                 "evaluate their folders apart"
             )
-    return places
+        names[stem], found[stem] = name, each
+    return found
 
 
 def read_truth(path: str | Path) -> dict[str, KnownPose]:
@@ -73,32 +82,34 @@ def read_truth(path: str | Path) -> dict[str, KnownPose]:
     Raises
     ------
     InputError
-        The file cannot be read, has not these columns, or a line is not whole or holds no angle.
+        The file cannot be read, has not these columns, or a line is not whole, holds no angle or one that
+        cannot be.
     UsageError
         Two frames have the same stem.
     """
-    rows = list(_rows(as_utf8(read_named(path), str(path)).decode(**TEXT), path))
-    if not rows:
+    known = by_stem(_rows(as_utf8(read_named(path), str(path)).decode(**TEXT), path))
+    if not known:
         raise InputError(f"{path}: holds no angle")
-    places = by_stem([name for name, _ in rows], str(path))
-    return {stem: rows[place][1] for stem, place in places.items()}
+    return known
 
 
-def _rows(text: str, path: str | Path) -> Iterator[tuple[str, KnownPose]]:
-    """Yield each line's name, and what it says of the rig."""
+def _rows(text: str, path: str | Path) -> Iterator[tuple[str, str, KnownPose]]:
+    """Yield where each line is, its name, and what it says of the rig."""
     lines = csv.DictReader(io.StringIO(text, newline=""), strict=True, skipinitialspace=True)
     try:
         if missing := [name for name in _NEEDED if name not in (lines.fieldnames or ())]:
-            raise InputError(f"{path}: has no column {', '.join(missing)}: known angles are a CSV with both")
+            raise InputError(f"{path}: has no column {', '.join(missing)}: {_FORM}")
         if twice := [name for name in _READ if (lines.fieldnames or ()).count(name) > 1]:
             raise InputError(f"{path}: has two columns {', '.join(twice)}: which one is meant?")
         for line in lines:
             where = f"{path}: line {lines.line_num}"
             if None in line or None in line.values():  # the file is cut, or a comma is a decimal point
                 raise InputError(f"{where}: has not as many values as there are columns")
-            yield line["file"], _known(line, where)
+            if not line["file"]:
+                raise InputError(f"{where}: file is empty: name the frame")
+            yield where, line["file"], _known(line, where)
     except csv.Error as error:
-        raise InputError(f"{path}: line {lines.line_num}: is not CSV: {error}") from error
+        raise InputError(f"{path}: line {lines.reader.line_num}: is not CSV ({error}): {_FORM}") from error
 
 
 def _known(line: Mapping[str, str], where: str) -> KnownPose:
@@ -110,6 +121,8 @@ def _known(line: Mapping[str, str], where: str) -> KnownPose:
     rig = [_number(line, name, where) for name in ("focal_px", "baseline_m") if line.get(name)]
     scale = rig[0] * rig[1] if len(rig) == 2 else None
     lane = tuple(_number(line, name, where) for name in _LANE if line.get(name))
+    if lane != tuple(sorted(lane)):
+        raise InputError(f"{where}: lane_lo_deg is above lane_hi_deg: give the lesser one first")
     return KnownPose(math.radians(_number(line, "roll_deg", where)), pitch, height, bends, scale, lane)
 
 
@@ -119,7 +132,8 @@ def _number(line: Mapping[str, str], name: str, where: str) -> float:
         number = float("" if "_" in text else text)  # `1_0` is Python's notation
     except ValueError:
         number = math.nan
-    if not math.isfinite(number) or (angle and abs(number) > 90):
-        kind = "an angle in degrees from -90 to 90" if angle else "a number"
+    length = name in _LENGTHS
+    if not math.isfinite(number) or (angle and abs(number) > 90) or (length and number <= 0):
+        kind = "an angle in degrees from -90 to 90" if angle else f"a number{' above 0' if length else ''}"
         raise InputError(f"{where}: {name} is {text!r}, not {kind}")
     return number
