@@ -172,7 +172,7 @@ def test_an_image_that_was_not_read_is_said():
         lambda each: rollcli.derotate(each, 0.1),
         lambda each: rollcli.height_map(each, estimate),
     ):
-        for wrong in (None, [[1, 2], [3]], "map.png", np.ones((360, 480), complex)):
+        for wrong in (None, [[1, 2], [3]], "map.png", np.ones((360, 480), complex), 1.0):
             with pytest.raises(rollcli.UsageError, match=r"map.* (real|None)"):
                 call(wrong)
 
@@ -199,6 +199,8 @@ def test_numbers_and_rows_of_numpy_are_taken_or_refused_in_words():
         rollcli.compute_disparity(left[0], right[0])
     with pytest.raises(rollcli.UsageError, match="what is of type NoneType is no estimate"):
         rollcli.height_map(typed_client.road(0.1), None)
+    with pytest.raises(rollcli.UsageError, match=r"of shape \(\d+, \d+\), not of shape \(\) and float"):
+        rollcli.height_map(1.0, rollcli.estimate_roll(typed_client.road(0.1)))
     with pytest.raises(rollcli.UsageError, match="at most 65535 bins"):
         rollcli.v_disparity(typed_client.road(0.1), bins=10**9)
     with pytest.raises(rollcli.UsageError, match="1 origins of 2 rows: give one for each, or none"):

@@ -174,11 +174,11 @@ def height_map(
 
 def heights_over(disparity: NDArray[Any], road: FittedRoad, calibration: Calibration | None) -> Singles:
     """Return the heights of a map over a road; see `height_map`."""
-    if disparity.shape != (road.height, road.width) or disparity.dtype.kind not in "fiu":
-        size = "x".join(map(str, disparity.shape[::-1]))
+    size = road.height, road.width
+    if disparity.shape != size or disparity.dtype.kind not in "fiu":
         raise UsageError(
-            f"{size} px of {disparity.dtype} are no map of real numbers of {road.width}x{road.height} px, "
-            "as the road was fitted to"
+            f"a disparity map of this road is real and of shape {size}, not of shape {disparity.shape} and "
+            f"{disparity.dtype}"
         )
     heights = np.full(disparity.shape, np.nan, np.float32)
     if calibration is not None:
