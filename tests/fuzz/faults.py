@@ -5,6 +5,7 @@ the bytes of a run that nothing disturbed; only a frame that could not be read s
 file, or parts.
 """
 
+import argparse
 import contextlib
 import os
 import shutil
@@ -150,4 +151,6 @@ def main(step: int = 1) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else 1))
+    parser = argparse.ArgumentParser(prog="python -m tests.fuzz.faults", description=__doc__)
+    parser.add_argument("step", type=int, nargs="?", default=1, help="try one fault of so many (all)")
+    sys.exit(main(parser.parse_args().step))
