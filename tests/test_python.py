@@ -121,9 +121,8 @@ def test_what_is_no_calibration_is_said(disparity):
         lambda: rollcli.height_map(disparity, estimate, str(CALIB)),
         lambda: rollcli.read_disparity(MAP, encoding="depth", calibration=str(CALIB)),
     ):
-        with pytest.raises(
-            rollcli.RollcliError, match=r"no such file|no calibration: give rollcli\.read_cal"
-        ):
+        said = r"no such file|no calibration: give rollcli\.read_cal"
+        with pytest.raises(rollcli.RollcliError, match=said):
             call()
 
 
@@ -197,16 +196,16 @@ def test_numbers_and_rows_of_numpy_are_taken_or_refused_in_words():
     assert np.array_equal(*given)
     with pytest.raises(rollcli.InputError, match="the left image is no array of pixels"):
         rollcli.compute_disparity(left[0], right[0])
-    with pytest.raises(rollcli.UsageError, match="what is of type NoneType is no estimate"):
-        rollcli.height_map(typed_client.road(0.1), None)
-    with pytest.raises(rollcli.UsageError, match=r"of shape \(\d+, \d+\), not of shape \(\) and float"):
-        rollcli.height_map(1.0, rollcli.estimate_roll(typed_client.road(0.1)))
-    with pytest.raises(rollcli.UsageError, match="at most 65535 bins"):
-        rollcli.v_disparity(typed_client.road(0.1), bins=10**9)
-    with pytest.raises(rollcli.UsageError, match="1 origins of 2 rows: give one for each, or none"):
-        rollcli.assess_rig({"roll_deg": [1, 1], "status": ["ok", "ok"]}, origins=["a"])
-    with pytest.raises(rollcli.UsageError, match="what is of type ndarray is no calibration"):
-        rollcli.estimate_roll(typed_client.road(0.1), calibration=left)
+    road, rolls = typed_client.road(0.1), {"roll_deg": [1, 1], "status": ["ok", "ok"]}
+    for said, call in (
+        ("what is of type NoneType is no estimate", lambda: rollcli.height_map(road, None)),
+        (r", \d+\), not of shape \(\)", lambda: rollcli.height_map(1.0, rollcli.estimate_roll(road))),
+        ("at most 65535 bins", lambda: rollcli.v_disparity(road, bins=10**9)),
+        ("1 origins of 2 rows: give one for each, or none", lambda: rollcli.assess_rig(rolls, origins=["a"])),
+        ("of type ndarray is no calibration", lambda: rollcli.estimate_roll(road, calibration=left)),
+    ):
+        with pytest.raises(rollcli.UsageError, match=said):
+            call()
 
 
 def test_what_a_masked_array_hides_and_what_is_beyond_any_disparity_is_no_data(disparity):

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from rollcli.errors import ExitStatus, UsageError
 from rollcli.extras import require_extra
 from rollcli.files.naming import listed, natural_key
-from rollcli.files.results import Result, Row, read_result
+from rollcli.files.results import Result, read_result
 from rollcli.files.storage import is_stream, write_output
 from rollcli.messages import counted
 from rollcli.report.charts import all_charts
@@ -57,7 +57,7 @@ def run_report(options: ReportOptions) -> ExitStatus:
     if len(parts) > 1:
         order, origins = order_of(parts)
         owned = [owned[place] for place in order]
-    owners, rows = zip(*owned, strict=True)
+    rows = tuple(row for _, row in owned)
     result = Result(rows, common_run([part.run for part in parts]))
     rig = assess_rig(rows, origins=origins)
     jumps = {
@@ -67,7 +67,7 @@ def run_report(options: ReportOptions) -> ExitStatus:
         for jump in found.jumps
     }
     chosen = choose(rows, options.gallery if options.output is not None else 0, sorted(jumps))
-    found = _subjects(parts, [(place, owners[place], rows[place]) for place in chosen], options)
+    found = subjects([owned[place] for place in chosen], parts, options.images, fetch=options.fetch)
     reads = [path for each in found for path in (*each.frame.reads(), *each.images.values())]
     page = [] if options.output is None or is_stream(options.output) else [options.output]
     charts = all_charts(rows, rig)
@@ -142,18 +142,3 @@ def _take(found: Sequence[Subject], jobs: int | None) -> list[Pictures]:
         with contextlib.closing(tasks) as taken:
             pictures = dict(zip(places, taken, strict=False))
     return [pictures[place] for place in sorted(pictures)]
-
-
-def _subjects(
-    parts: Sequence[Result], chosen: Sequence[tuple[int, int, Row]], options: ReportOptions
-) -> list[Subject]:
-    """Find the files of the frames to show, each from where its own result lies.
-
-    Of each frame its place, which of the parts it is of, and its row.
-    """
-    found: dict[int, Subject] = {}
-    for number, part in enumerate(parts):
-        mine = {place: row for place, owner, row in chosen if owner == number}
-        of_part = subjects([*mine.values()], part, options.images, fetch=options.fetch)
-        found |= zip(mine, of_part, strict=True)
-    return [found[place] for place, _, _ in chosen]

@@ -93,15 +93,18 @@ class Subject:
         return math.radians(self.row.map_roll_deg or 0.0)
 
 
-def subjects(rows: Sequence[Row], result: Result, images: str | None, *, fetch: bool) -> list[Subject]:
-    """Find the files of rows of a result that have an angle.
+def subjects(
+    chosen: Sequence[tuple[int, Row]], parts: Sequence[Result], images: str | None, *, fetch: bool
+) -> list[Subject]:
+    """Find the files of rows of results that have an angle.
 
     Parameters
     ----------
-    rows : sequence of Row
-    result : Result
-        Its path: names that do not exist from here are looked for beside it. And its run: how it was made,
-        which folders it wrote images to, and its calibration, where all rows have one.
+    chosen : sequence of (int, Row)
+        Each row, and which of the results it is of.
+    parts : sequence of Result
+        Their paths: names that do not exist from here are looked for beside them. And their runs: how they
+        were made, which folders they wrote images to, and their calibration, where all rows have one.
     images : str or None
         The folder of images, or of folders of images, that `estimate` wrote.
     fetch : bool
@@ -113,24 +116,23 @@ def subjects(rows: Sequence[Row], result: Result, images: str | None, *, fetch: 
     UsageError
         There is no such folder, or there are no images of some rows in it.
     InputError
-        The record of the run is none.
+        The record of a run is none.
     """
-    options = recorded_options(result.run, run_path(result.path))
-    calibrations = recorded_calibrations(result.run)
-    calibration = calibrations[0] if len(calibrations) == 1 else None  # else each frame has its own
     there = None if images is None else _ImageFolder(images)
-    found = [_images(row, there, options.images) if there is not None else {} for row in rows]
-    without = [row.file for row, files in zip(rows, found, strict=True) if images is not None and not files]
-    if without:
+    runs = [(recorded_options(p.run, run_path(p.path)), recorded_calibrations(p.run)) for p in parts]
+    found = []
+    for owner, row in chosen:
+        result, (options, calibrations) = parts[owner].path, runs[owner]
+        calibration = calibrations[0] if len(calibrations) == 1 else None  # else each frame has its own
+        frame = frame_of_row(row, result)._replace(calibration=calibration)
+        files = {} if there is None else _images(row, there, options.images)
+        found.append(Subject(frame, files, row, options, _refusal(row, result, there, fetch)))
+    if there is not None and (without := [each.row.file for each in found if not each.images]):
         raise UsageError(
             f"{images}: has no image of {listed(without)}: name the folder where estimate has put what it "
             "wrote, or leave --images out to have the pictures made from the inputs"
         )
-    frames = [frame_of_row(row, result.path)._replace(calibration=calibration) for row in rows]
-    return [
-        Subject(frame, files, row, options, _refusal(row, result.path, there, fetch))
-        for frame, files, row in zip(frames, found, rows, strict=True)
-    ]
+    return found
 
 
 def _refusal(row: Row, result: str, images: "_ImageFolder | None", fetch: bool) -> str:

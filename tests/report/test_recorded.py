@@ -337,6 +337,10 @@ def _chosen(count, jumps=(), rows=None):
     return [*choose(rows, count, jumps).items()]
 
 
+def _subjects_of(rows, run=None, path="rolls.csv", images=None, fetch=False):
+    return subjects([(0, each) for each in rows], [Result((), run, path)], images, fetch=fetch)
+
+
 def _looked_for(rows, there="", images=None, result="rolls.csv", inside=".", **folders):
     """Which files are those of rows, where such files and objects are there."""
     objects = [(each, 9) for each in there.split() if "://" in each]
@@ -348,7 +352,7 @@ def _looked_for(rows, there="", images=None, result="rolls.csv", inside=".", **f
     ):
         os.chdir(inside)
         options = {kind.replace("_", "-"): each or None for kind, each in folders.items()}
-        found = made(subjects, given, Result((), {"options": options}, result), images, fetch=False)
+        found = made(_subjects_of, given, {"options": options}, result, images)
     if isinstance(found, str):
         return found
     paths = [[each.frame.path, each.frame.right_path.replace(os.sep, "/")] for each in found]
@@ -364,7 +368,7 @@ def _subjects():
     with folder_of(f"out/{each}" for each in f"{there} road_mask/m_000002.png".split()):
         return [
             [each.theta, each.row.alpha, each.refused, sorted(each.images.items())]
-            for each in subjects(rows, Result((), run, "rolls.csv"), "out/", fetch=False)
+            for each in _subjects_of(rows, run, images="out/")
         ]
 
 
@@ -399,7 +403,7 @@ def _views(quantity):
 def _refused():
     rows = [(replace(row(one), right_file=other), result) for one, other, result in INPUTS["remote"]]
     return [
-        [subjects([each], Result((), None, result), None, fetch=fetch)[0].refused for fetch in (False, True)]
+        [_subjects_of([each], path=result, fetch=fetch)[0].refused for fetch in (False, True)]
         for each, result in rows
     ]
 
@@ -419,7 +423,7 @@ def _taken(images=(), disparity=ROAD, roll=5.75, camera=None, alpha0=-8.0, **opt
         given = replace(row(f"{folder}/a.npy", roll), alpha0=alpha0, alpha1=0.4, height_m=camera)
         given = replace(given, width=disparity.shape[1], height=disparity.shape[0])
         run = {"options": {"encoding": "px", "heights-range": [-0.3, 0.3]}}
-        (subject,) = subjects([given], Result((), run, f"{folder}/rolls.csv"), None, fetch=False)
+        (subject,) = _subjects_of([given], run, f"{folder}/rolls.csv")
         subject = replace(subject, images={kind: f"{folder}/{name}" for kind, name in images}, **options)
         with mock.patch.object(cv2, "putText", lambda picture, *_: picture):
             found = pictures.take_pictures(subject)

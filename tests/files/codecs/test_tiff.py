@@ -174,9 +174,8 @@ def test_a_volume_is_no_map():
 def test_pixels_end_where_the_file_ends_or_the_end_is_named():
     whole = tiff_by_tifffile(VALUES)  # its pixels come last
     np.testing.assert_array_equal(decode_stored(whole, "x").values, VALUES)
-    with pytest.raises(
-        InputError, match=f"x: is truncated: its pixels end at byte {len(whole)} of {len(whole) - 1}$"
-    ):
+    said = f"x: is truncated: its pixels end at byte {len(whole)} of {len(whole) - 1}$"
+    with pytest.raises(InputError, match=said):
         decode_stored(whole[:-1], "x")
 
 
