@@ -6,7 +6,6 @@ Its bytes are the same whatever the workers.
 import json
 import math
 import re
-import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
@@ -27,7 +26,7 @@ from rollcli.files.results import csv_table, read_run, run_path
 from rollcli.files.stores.locations import require_local
 from rollcli.messages import say
 from rollcli.run.options import RunningOptions
-from rollcli.run.outputs import Existing
+from rollcli.run.outputs import Existing, list_files
 from rollcli.run.progress import TaskProgress
 from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import Stop, stop_on_signals
@@ -336,7 +335,7 @@ def run_simulate(
     """
     dataset = plan_dataset(folder, options, overwrite=running.overwrite)
     if running.dry_run:
-        sys.stdout.writelines(f"write {path}\n" for path in dataset.files())
+        list_files([((), map(str, dataset.files()))])
         return ExitStatus.DONE
     nearest = max(spec.nearest_disparity for spec in dataset.specs)
     if nearest > KITTI_TOP:

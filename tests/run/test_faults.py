@@ -124,11 +124,10 @@ def test_a_closed_pipe_ends_the_run_quietly(maps, jobs):
     assert err == ""
 
 
-def test_a_closed_standard_output_is_an_error_in_one_line(maps):
-    line = " ".join(command("estimate", "maps", "-q")) + " >&-"
-    done = ended(["sh", "-c", line], maps)
-    assert done.returncode == 1
-    assert done.stderr == "rollcli: standard output: is closed\n"
+@pytest.mark.parametrize("words", [("estimate", "maps", "-q"), ("simulate", "out", "--dry-run")])
+def test_a_closed_standard_output_is_an_error_in_one_line(maps, words):
+    done = ended(["sh", "-c", " ".join(command(*words)) + " >&-"], maps)
+    assert (done.returncode, done.stderr) == (1, "rollcli: standard output: is closed\n")
 
 
 # in a worker, reading certain maps kills it
