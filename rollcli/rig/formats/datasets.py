@@ -41,10 +41,7 @@ def read_kitti(file: File) -> Fields:
             f"has only {views}: the projections of both views are needed, "
             f"{key.format(0)} and {key.format(1)} or {key.format(2)} and {key.format(3)}"
         )
-    size_key = f"S_rect_0{pairs[0][0]}"
-    first, *other = (
-        _kitti_fields(file, values, size_key, *(key.format(view) for view in pair)) for pair in pairs
-    )
+    first, *other = (_kitti_fields(file, values, *map(key.format, pair)) for pair in pairs)
     grey, *colour = (f"{each.baseline:.5f}" for each in (first, *other))
     if colour not in ([], [grey]):
         note = (
@@ -61,7 +58,7 @@ def read_driving_stereo(file: File) -> Fields:
     missing = [key for key in DRIVING_STEREO if key not in values]
     if missing:
         raise file.error(f"has no {missing[0]}: the file is cut off")
-    return _kitti_fields(file, values, "S_rect_101", *DRIVING_STEREO)
+    return _kitti_fields(file, values, *DRIVING_STEREO)
 
 
 def _kitti_values(file: File) -> dict[str, str]:
@@ -73,11 +70,12 @@ def _kitti_values(file: File) -> dict[str, str]:
     return values
 
 
-def _kitti_fields(file: File, values: Mapping[str, str], size_key: str, left: str, right: str) -> Fields:
+def _kitti_fields(file: File, values: Mapping[str, str], left: str, right: str) -> Fields:
     """Return the left view, the baseline in metres, doffs, and the size where it is stated."""
     found = file.pair(*(file.projection(values[key].split(), key) for key in (left, right)))
     if found.baseline is not None and found.baseline < 0:
         raise file.swapped()
+    size_key = f"S_rect_{left.removeprefix('P_rect_').removeprefix('P').zfill(2)}"
     stated = values.get(size_key, "").split()
     if len(stated) not in (0, 2):
         raise file.error(f"{size_key} has {len(stated)} numbers: width and height are needed")
