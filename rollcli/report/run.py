@@ -8,7 +8,7 @@ from rollcli.extras import require_extra
 from rollcli.files.naming import listed, natural_key
 from rollcli.files.results import Result, read_result
 from rollcli.files.storage import is_stream, write_output
-from rollcli.messages import counted
+from rollcli.messages import counted, say
 from rollcli.report.charts import all_charts
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import Chart
@@ -17,7 +17,6 @@ from rollcli.report.sources import Subject, choose, subjects
 from rollcli.report.summary import common_run
 from rollcli.rig.drive.assess import RigAssessment, assess_rig
 from rollcli.run.outputs import check_named_once, listed_only
-from rollcli.run.progress import TaskProgress
 from rollcli.run.rig import order_of, require_rows, unfinished
 from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import stop_on_signals
@@ -101,10 +100,9 @@ def _write(
     from rollcli.report.content import report_page
     from rollcli.report.figures import chart_file
 
-    progress = TaskProgress(len(found), options.running)
     pictures = _take(found, options.running.jobs)
     if len(pictures) < len(found):
-        progress.say("interrupted; nothing is written")
+        say("interrupted; nothing is written")
         return ExitStatus.INTERRUPTED
     files = {
         path: chart_file(chart, kind)
@@ -114,21 +112,21 @@ def _write(
     for path, data in files.items():
         write_output(path, data, overwrite=options.running.overwrite)
     if files:
-        progress.note(f"{listed(list(files))}: written")
+        options.running.note(f"{listed(list(files))}: written")
     if options.output is None:
         return ExitStatus.DONE
     page = report_page(result, options, list(zip(chosen.items(), pictures, strict=True)), rig, charts)
     write_output(options.output, page, overwrite=options.running.overwrite)
     missing = [each.missing for each in pictures if not each.made]
     for reason in missing[:_REASONS]:
-        progress.say(f"no picture of {reason}")
+        say(f"no picture of {reason}")
     if missing:
-        progress.say(
+        say(
             f"{len(missing)} of {counted(len(pictures), 'frame')} without pictures: run where estimate ran, "
             "name what it wrote with --images, or leave pictures out with --gallery 0"
         )
     shown = len(pictures) - len(missing)
-    progress.note(f"{options.output}: pictures of {counted(shown, 'frame')}, {len(page) / 1e6:.1f} MB")
+    options.running.note(f"{options.output}: pictures of {counted(shown, 'frame')}, {len(page) / 1e6:.1f} MB")
     return ExitStatus.FRAMES_FAILED if missing else ExitStatus.DONE
 
 
