@@ -17,7 +17,7 @@ from rollcli.files.storage import read_named
 _NEEDED = ("file", "roll_deg")
 _LANE = "lane_lo_deg", "lane_hi_deg"
 _LENGTHS = "height_m", "focal_px", "baseline_m"
-_READ = (*_NEEDED, *_LANE, "pitch_deg", "curvature_per_m", *_LENGTHS)
+_NUMBERS = ("roll_deg", *_LANE, "pitch_deg", "curvature_per_m", *_LENGTHS)
 _FORM = "known angles are a CSV with the columns file and roll_deg"
 
 Named = TypeVar("Named")
@@ -99,7 +99,7 @@ def _rows(text: str, path: str | Path) -> Iterator[tuple[str, str, KnownPose]]:
     try:
         if missing := [name for name in _NEEDED if name not in (lines.fieldnames or ())]:
             raise InputError(f"{path}: has no column {', '.join(missing)}: {_FORM}")
-        if twice := [name for name in _READ if (lines.fieldnames or ()).count(name) > 1]:
+        if twice := [name for name in ("file", *_NUMBERS) if (lines.fieldnames or ()).count(name) > 1]:
             raise InputError(f"{path}: has two columns {', '.join(twice)}: which one is meant?")
         for line in lines:
             where = f"{path}: line {lines.line_num}"
@@ -113,26 +113,23 @@ def _rows(text: str, path: str | Path) -> Iterator[tuple[str, str, KnownPose]]:
 
 
 def _known(line: Mapping[str, str], where: str) -> KnownPose:
-    bends = bool(line.get("curvature_per_m")) and _number(line, "curvature_per_m", where) != 0
-    pitch, height = (
-        _number(line, name, where) if line.get(name) and not bends else None
-        for name in ("pitch_deg", "height_m")
-    )
-    rig = [_number(line, name, where) for name in ("focal_px", "baseline_m") if line.get(name)]
-    scale = rig[0] * rig[1] if len(rig) == 2 else None
-    lane = tuple(_number(line, name, where) for name in _LANE if line.get(name))
+    given = {n: _number(line[n], n, where) for n in _NUMBERS if line.get(n) or n == "roll_deg"}
+    bends = given.get("curvature_per_m", 0.0) != 0
+    pitch, height = (None if bends else given.get(name) for name in ("pitch_deg", "height_m"))
+    rig = [given[name] for name in ("focal_px", "baseline_m") if name in given]
+    lane = tuple(given[name] for name in _LANE if name in given)
     if lane != tuple(sorted(lane)):
         raise InputError(f"{where}: lane_lo_deg is above lane_hi_deg: give the lesser one first")
-    return KnownPose(math.radians(_number(line, "roll_deg", where)), pitch, height, bends, scale, lane)
+    scale = rig[0] * rig[1] if len(rig) == 2 else None
+    return KnownPose(math.radians(given["roll_deg"]), pitch, height, bends, scale, lane)
 
 
-def _number(line: Mapping[str, str], name: str, where: str) -> float:
-    text, angle = line[name], name.endswith("_deg")
+def _number(text: str, name: str, where: str) -> float:
+    angle, length = name.endswith("_deg"), name in _LENGTHS
     try:
         number = float("" if "_" in text else text)  # `1_0` is Python's notation
     except ValueError:
         number = math.nan
-    length = name in _LENGTHS
     if not math.isfinite(number) or (angle and abs(number) > 90) or (length and number <= 0):
         kind = "an angle in degrees from -90 to 90" if angle else f"a number{' above 0' if length else ''}"
         raise InputError(f"{where}: {name} is {text!r}, not {kind}")
