@@ -49,7 +49,7 @@ SIZE = ("width", "height")
 BOUNDS = {
     "roll_deg": (-90.0, 90.0),
     "image_roll_deg": (-90.0, 90.0),
-    "roll_ci95_deg": (0.0, math.inf),
+    **{each.ci_column: (0.0, math.inf) for each in QUANTITIES},
     "pitch_deg": (-90.0, 90.0),
     "height_m": (0.0, math.inf),
 }
