@@ -16,7 +16,7 @@ from rollcli.errors import InputError
 from rollcli.files.codecs.arrays import COLOUR_REMEDY, Stored, native, require_decoded_fits
 from rollcli.files.codecs.png import decoded_by_opencv, decoding
 
-_NONE, _LZW, _DEFLATE, _OLD_DEFLATE, _PACKBITS = 1, 5, 8, 32946, 32773
+_NONE, _LZW, _JPEG, _DEFLATE, _OLD_DEFLATE, _PACKBITS = 1, 5, 7, 8, 32946, 32773
 # how many bytes one byte can stand for
 _MAX_EXPANSION = {_NONE: 1, _LZW: 2732, _DEFLATE: 1032, _OLD_DEFLATE: 1032, _PACKBITS: 64}
 _PADDING = 1  # bytes after uncompressed data: parts begin at even places
@@ -155,7 +155,8 @@ def _decoded_parts(page: Any, shape: tuple[int, ...], part: tuple[int, int], dat
 
 
 SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-_WHITE_IS_ZERO, _RGB, _PALETTE = 0, 2, 3
+_WHITE_IS_ZERO, _RGB, _PALETTE, _LUMA_CHROMA = 0, 2, 3, 6
+_OPACITY = (1, 2)  # what a further channel may be
 _CHUNKY = 1
 _LARGE_TILE = 2**22  # pixels; a small image may lie in one large tile
 _NOT_A_PAGE_OF_ITS_OWN = 0b101  # a reduced copy, or a mask, of another page
@@ -182,8 +183,11 @@ def picture(data: bytes) -> NDArray[Any]:
     with _first_page(data) as (file, page):
         if _note(file):
             raise InputError("holds several pages; save the view that is meant as a file of its own")
-        colour = page.photometric == _RGB and page.samplesperpixel >= 3
-        if not (colour or page.samplesperpixel == 1) or page.photometric == _PALETTE:
+        # tifffile turns the luma and chroma of JPEG into RGB
+        as_rgb = page.photometric == _RGB or (page.photometric, page.compression) == (_LUMA_CHROMA, _JPEG)
+        colour = as_rgb and page.samplesperpixel >= 3
+        grey = page.samplesperpixel == 1 or (page.samplesperpixel == 2 and page.extrasamples[0] in _OPACITY)
+        if not (colour or grey) or page.photometric == _PALETTE:
             raise InputError("is neither a grey nor an RGB TIFF")
         pixels = _pixels(page, data)
         if pixels.dtype not in (np.uint8, np.uint16):

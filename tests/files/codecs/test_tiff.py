@@ -11,6 +11,8 @@ import pytest
 from rollcli.errors import InputError
 from rollcli.files.formats import decode_image, decode_mask, decode_stored
 from tests.binary_files import disparity_map, flipped, make_tiff, tiff_by_tifffile, tiff_of_bits, with_fields
+from tests.recorded import made
+from tests.run_cli import error_of
 
 KINDS = ("u1", "u2", "i2", "f2", "f4", "f8")
 
@@ -71,11 +73,8 @@ def test_a_size_that_is_not_that_of_the_parts_is_refused(compression, layout, li
 def test_compressions_of_another_package_name_it():
     file = with_fields(make_tiff(values_of("u2"), "deflate"), {259: (8, 50000)})
 
-    with pytest.raises(
-        InputError,
-        match=r"cannot be decoded \(compression 50000, 16 bits a number\): pip install imagecodecs",
-    ):
-        decode_stored(file, "map.tif")
+    said = error_of(InputError, decode_stored, file, "map.tif")
+    assert "cannot be decoded (compression 50000, 16 bits a number): pip install imagecodecs" in said
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
@@ -147,6 +146,20 @@ def test_colours_lie_side_by_side_or_in_a_plane_each(kind, layout, planes):
 
     assert found.dtype == kind
     np.testing.assert_array_equal(found, rgb[..., ::-1])
+
+
+@pytest.mark.parametrize(("extra", "is_read"), [("unassalpha", True), ("assocalpha", True), (0, False)])
+def test_opacity_beside_greys_is_left_aside(extra, is_read):
+    file = tiff_by_tifffile(COLOURS[..., :2], photometric=1, extrasamples=[extra], planarconfig="contig")
+    seen = made(decode_image, file, "x")
+    assert np.array_equal(seen, COLOURS[..., 0]) if is_read else "neither a grey nor an RGB TIFF" in seen
+
+
+@pytest.mark.skipif(not find_spec("imagecodecs"), reason="imagecodecs is not installed here")
+def test_luma_and_chroma_of_a_jpeg_are_colours():
+    file = tiff_by_tifffile(cv2.resize(COLOURS[..., :3], (480, 320)), photometric="ycbcr", compression="jpeg")
+    expected = cv2.imdecode(np.frombuffer(file, np.uint8), cv2.IMREAD_COLOR)
+    np.testing.assert_allclose(decode_image(file, "x"), expected, atol=2)
 
 
 # TIFF 6.0, NewSubfileType: bit 0 is a reduced copy, bit 1 a page of many, bit 2 a mask of another image
