@@ -17,7 +17,7 @@ from rollcli.files.codecs.arrays import Stored, native, require_decoded_fits
 from rollcli.files.codecs.png import PICTURE_FLAGS, decoded_by_opencv
 
 _BMP = b"BM"
-LOSSLESS = (_BMP, b"P5", b"P6")
+LOSSLESS = (_BMP, b"P2", b"P3", b"P5", b"P6")  # P2 and P3: numbers as text
 SIGNATURES = (b"\xff\xd8\xff", *LOSSLESS)
 _FRAME_HEADERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _WITHOUT_LENGTH = frozenset((0x00, 0x01, *range(0xD0, 0xDA)))
