@@ -191,7 +191,7 @@ class _Chunked:
 
         offset, damaged = self.start, list[int]()
         try:
-            while offset < self._size:
+            while offset <= self._size:
                 found = self._record(offset, wanted)
                 for number, (channel, time, data) in enumerate(found.messages):
                     if wanted(channel, number):
@@ -325,6 +325,8 @@ class _Ros1(_Chunked):
         return int(struct.unpack("<Q", fields[b"index_pos"])[0])
 
     def _head(self) -> _Head:
+        if self._file.tell() == self._size:  # no record says that it is the last
+            return None, -1, "", 0
         fields = _fields(_exactly(self._file, self._length()))
         after = self._length() + self._file.tell()
         op = fields[b"op"][0]
