@@ -104,7 +104,9 @@ def bag_files(location: str) -> list[str]:
     if location.lower().endswith(BAGS) and not is_folder(location):
         require_local(location)
         return [location]
-    is_bag = is_file(os.path.join(location, "metadata.yaml"))  # noqa: PTH118
+    # a recorder that is killed writes no metadata.yaml beside DRIVE/DRIVE_0.mcap
+    first = f"{Path(os.path.abspath(location)).name}_0"  # noqa: PTH100
+    is_bag = any(is_file(f"{location}/{each}") for each in ("metadata.yaml", f"{first}.mcap", f"{first}.db3"))
     files = [location]
     if is_bag:
         names = sorted(os.listdir(location), key=natural_key)  # noqa: PTH208
