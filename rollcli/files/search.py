@@ -123,7 +123,7 @@ class Search:
     notes: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self._skip = {os.path.realpath(folder) for folder in self.skip if not is_url(folder)}
+        self._skip = {_identity(folder) for folder in self.skip if not is_url(folder)} - {_NOWHERE}
         self._skipped_urls = tuple(f"{folder.rstrip('/')}/" for folder in self.skip if is_url(folder))
 
     def files(self, argument: str, *, literal: bool = False) -> Iterator[tuple[str, str]]:
@@ -212,10 +212,9 @@ class Search:
 
     def _in_folder(self, folder: Path) -> Iterator[tuple[str, str]]:
         """Yield readable files, except hidden ones."""
-        skipped = {_identity(each) for each in self._skip} - {_NOWHERE}
-        if _identity(folder) in skipped:
+        if _identity(folder) in self._skip:
             raise UsageError(f"{folder}: {_BOTH}")
-        closed = skipped | {_identity(folder)}  # links may make a circle
+        closed = self._skip | {_identity(folder)}  # links may make a circle
         base = str(folder)
         cut = 0 if base == os.curdir else len(base.rstrip(os.sep)) + 1  # what stands before a relative path
         waiting = [base]
@@ -271,7 +270,7 @@ class Search:
         for match in _matches(pattern):
             path = Path(match)
             relative = Path(os.path.relpath(path, base))
-            inside = {os.path.realpath(base / parent) for parent in relative.parents[:-1]}
+            inside = {_identity(base / parent) for parent in relative.parents[:-1]}
             wanted = at_its_word or self._reads(match)
             if wanted and self._skip.isdisjoint(inside) and stat.S_ISREG(mode_of(match, _UNSEEN)):
                 below = "/".join(part for part in relative.parts if part != "..")  # outputs stay below
