@@ -94,22 +94,13 @@ print("b", file=sys.stderr, flush=True)
 """
 
 
-def heard(before):
-    return python(TALK.format(before=before), check=True).stderr
+CLOSED = "silence_decoders(); kept = os.dup(1); os.close(2); sys.stderr = os.fdopen(kept, 'w')"
+HEARD = {"": "a\nlibpng error\nb\n", "silence_decoders()": "a\nb\n", CLOSED: ""}
 
 
-def test_nothing_is_touched_before_it_is_asked_for():
-    assert heard("") == "a\nlibpng error\nb\n"
-
-
-def test_only_what_is_printed_while_decoding_is_lost():
-    assert heard("silence_decoders()") == "a\nb\n"
-
-
-def test_a_closed_terminal_is_no_trouble():
-    close = "silence_decoders(); kept = os.dup(1); os.close(2); sys.stderr = os.fdopen(kept, 'w')"
-
-    assert heard(close) == ""
+@pytest.mark.parametrize(("before", "heard"), HEARD.items(), ids=["not asked for", "asked for", "closed"])
+def test_only_what_is_printed_while_decoding_is_lost_and_once_it_is_asked_for(before, heard):
+    assert python(TALK.format(before=before), check=True).stderr == heard
 
 
 def test_what_goes_wrong_inside_comes_out():

@@ -107,10 +107,8 @@ def test_a_mask_of_bits_is_what_is_shown_of_it(zero_is):
 
 def picture_or_mask(data):
     """The bytes of a mask; None if it is refused."""
-    try:
-        return decode_mask(data, "x").tobytes()
-    except InputError:
-        return None
+    found = made(decode_mask, data, "x")
+    return None if isinstance(found, str) else found.tobytes()
 
 
 def data_of(tiff):
