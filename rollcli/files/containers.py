@@ -101,19 +101,20 @@ def bag_files(location: str) -> list[str]:
     UsageError
         They are compressed as whole files, or in a store.
     """
-    if location.lower().endswith(BAGS) and not is_folder(location):
-        require_local(location)
-        return [location]
-    # a recorder that is killed writes no metadata.yaml beside DRIVE/DRIVE_0.mcap
-    first = f"{Path(os.path.abspath(location)).name}_0"  # noqa: PTH100
-    is_bag = any(is_file(f"{location}/{each}") for each in ("metadata.yaml", f"{first}.mcap", f"{first}.db3"))
     files = [location]
-    if is_bag:
-        names = sorted(os.listdir(location), key=natural_key)  # noqa: PTH208
+    if is_folder(location):
+        # a recorder that is killed writes no metadata.yaml beside DRIVE/DRIVE_0.mcap
+        first = f"{Path(os.path.abspath(location)).name}_0"  # noqa: PTH100
+        marks = ("metadata.yaml", f"{first}.mcap", f"{first}.db3")
+        is_bag = any(is_file(f"{location}/{each}") for each in marks)
+        names = sorted(os.listdir(location), key=natural_key) if is_bag else []  # noqa: PTH208
         files = [f"{location.rstrip('/')}/{name}" for name in names]
     if packed := next((each for each in files if each.lower().endswith((".db3.zstd", ".mcap.zstd"))), None):
         raise UsageError(f"{packed}: is compressed as a whole; unpack it by zstd -d")
-    return [each for each in files if each.lower().endswith(BAGS)] if is_bag else []
+    found = [each for each in files if each.lower().endswith(BAGS)]
+    if found:
+        require_local(location)
+    return found
 
 
 def refuse_others(location: str) -> None:

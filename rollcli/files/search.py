@@ -15,7 +15,7 @@ from pathlib import Path
 
 from rollcli.errors import UsageError, as_usage, reading
 from rollcli.files.atomic import is_file, is_folder, mode_of
-from rollcli.files.containers import file_of, frame_name, is_archive, members, refuse_others
+from rollcli.files.containers import BAGS, file_of, frame_name, is_archive, members, refuse_others
 from rollcli.files.stores.locations import base_name, is_object_url, is_url, public_name, split_url
 from rollcli.files.stores.objects import has_objects, list_objects
 
@@ -203,6 +203,8 @@ class Search:
         names = [entry.name for entry in _entries(folder) if not entry.name.startswith(".")]
         endings = {Path(name).suffix.lower() for name in names[:_LOOKED_AT]} - {"", *self.endings}
         hint = f"; it holds {' '.join(sorted(endings)[:3])} files" if endings else ""
+        if bag := next((each for each in BAGS if each in endings), ""):
+            hint += f": name the bags themselves, as '{folder}/*{bag}'"
         inner = any(is_folder(Path(folder, name)) for name in names[:_LOOKED_AT])
         lower = {name.lower(): name for name in names}
         left, right = (next((lower[name] for name in sorted(side) if name in lower), "") for side in _SIDES)
