@@ -104,19 +104,14 @@ def decode_stored(data: bytes, name: str) -> Stored:
     return replace(stored, note=stored.note and f"{name} {stored.note}")
 
 
-def encode_stored(
-    values: NDArray[Any],
-    format: str,  # noqa: A002
-    nodata: tuple[float, ...] = (),
-    text: str = "",
-) -> bytes:
+def encode_stored(values: NDArray[Any], form: str, nodata: tuple[float, ...] = (), text: str = "") -> bytes:
     """Encode numbers as a map file.
 
     Parameters
     ----------
     values : ndarray, shape (H, W)
         PNG holds uint8 and uint16, PFM float32, TIFF and NPY any real dtype.
-    format : str
+    form : str
         "png", "tiff", "npy", "npz", "pfm", "exr" or "rgb".
     nodata : tuple of float
         The stored values that mean no data; written as GDAL's tag to a TIFF.
@@ -128,7 +123,7 @@ def encode_stored(
     OutputError
         This OpenCV writes no EXR.
     """
-    return MAP_FORMATS[format].encode(values, nodata, text)
+    return MAP_FORMATS[form].encode(values, nodata, text)
 
 
 def read_image(path: str | Path, name: str | None = None) -> NDArray[Any]:
