@@ -431,14 +431,21 @@ Bag = _Mcap | _Ros1 | _Sqlite
 _KINDS: dict[bytes, type[Bag]] = {_MCAP: _Mcap, _BAG: _Ros1, _SQLITE: _Sqlite}
 
 
-def open_bag(path: str) -> Bag:
-    """Open a bag by its first bytes; `broken` says what is wrong behind its whole messages, or nothing.
+def opened(path: str) -> Bag:
+    """Open a bag by its first bytes, or return the one that is open.
+
+    Its `broken` says what is wrong behind its whole messages, or nothing.
 
     Raises
     ------
     InputError
         It is none, or cannot be read.
     """
+    return _opened(*state_of(path), threading.get_ident())
+
+
+@lru_cache(maxsize=16)  # a thread opens a bag once: each is at places of its own in the file
+def _opened(path: str, size: int, modified_ns: int, process: int, thread: int) -> Bag:
     with reading(path):
         with Path(path).open("rb") as file:
             head = file.read(16)
@@ -447,13 +454,3 @@ def open_bag(path: str) -> Bag:
                 return kind(path)
     what = "is empty" if not head else "is no ROS 1 bag, MCAP file or sqlite3 bag"
     raise InputError(f"{path}: {what}")
-
-
-def opened(path: str) -> Bag:
-    """Open a bag, or return the one that is open; see `open_bag`."""
-    return _opened(*state_of(path), threading.get_ident())
-
-
-@lru_cache(maxsize=16)  # a thread opens a bag once: each is at places of its own in the file
-def _opened(path: str, size: int, modified_ns: int, process: int, thread: int) -> Bag:
-    return open_bag(path)

@@ -20,7 +20,6 @@ from rollcli.files.recordings.bags import Topic, opened
 from rollcli.files.recordings.messages import CAMERA_INFO, COMPRESSED, DISPARITY, IMAGE, CameraInfo
 from rollcli.rig.calibration import Calibration
 
-_VIEWS = (IMAGE, COMPRESSED)
 _RAW = "image_raw"
 _NO_P = "no CameraInfo with a principal point (P) in the image: no pitch and no height without --calib"
 _NO_LEFT = "no CameraInfo of the left view, but with a negative Tx: no pitch and no height without --calib"
@@ -295,7 +294,7 @@ def _only_map_topic(files: Sequence[str], topics: dict[str, Topic], name: str) -
     options = " or ".join(f"--topic {each}" for each in sorted(fitting))
     if fitting:
         raise UsageError(f"{name}: several topics fit: give one of {options}")
-    views = any(each.type in _VIEWS for each in topics.values())
+    views = any(each.type in (IMAGE, COMPRESSED) for each in topics.values())
     hint = "; for views give --left-topic and --right-topic" if views else ""
     raise UsageError(f"{name}: has no topic of disparity or depth maps{hint}; {_all(topics)}")
 

@@ -19,7 +19,7 @@ import pytest
 
 from rollcli.errors import RollcliError
 from rollcli.files.recordings import messages
-from rollcli.files.recordings.bags import Topic, open_bag
+from rollcli.files.recordings.bags import Topic, opened
 from tests.recorded import made
 
 _MAGIC = b"\x89MCAP0\r\n"
@@ -125,7 +125,7 @@ def _read(data):
         path = Path(folder, "x")
         path.write_bytes(data)
         try:
-            bag = open_bag(str(path))
+            bag = opened(str(path))
             topics = bag.topics
             found = list(bag.messages(set(topics) - {"none"}, ["/b"]))
         except RollcliError as error:
