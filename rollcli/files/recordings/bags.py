@@ -206,19 +206,17 @@ class _Chunked:
         if damaged:
             self.broken = f"is damaged or cut off in what begins at byte {damaged[0]} of its {self._size}"
 
-    def read(self, place: tuple[int, ...]) -> Message:
-        """Read one message."""
+    def read(self, place: tuple[int, ...]) -> memoryview:
+        """Return the bytes of one message."""
         offset, number = place
         try:
             at, found = self._last
             if at != offset:
                 found = self._record(offset, lambda _, each: _ALL if each == number else 0, at_once=True)
                 self._last = (offset, found) if found.unpacked else self._last
-            channel, time, data = found.messages[number]
+            return found.messages[number][-1]
         except _DAMAGED:
             raise InputError(f"{self.path}: there is no whole message at byte {offset}") from None
-        topic = self._topics.get(channel)
-        return Message(topic.name if topic else "", time, place, data)
 
     def _content(self, compression: str, packed: int, size: int, *, at_once: bool) -> _Source:
         """Return what a chunk holds: the file stands at its packed bytes.
@@ -401,7 +399,7 @@ class _Sqlite:
                     with self._base.blobopen("messages", "data", number, readonly=True) as blob:
                         data = blob.read(_BEGINNING)
                 elif name in topics or not whole:  # the first that a file which is cut off has not ends it
-                    data = self.read((number, 0)).data
+                    data = self.read((number, 0))
                 count += 1
                 if name in topics:
                     yield Message(name, time, (number, 0), memoryview(data))
@@ -415,16 +413,15 @@ class _Sqlite:
         needed: int = pages * (size if size > 1 else 65536)
         return Path(self.path).stat().st_size >= needed
 
-    def read(self, place: tuple[int, ...]) -> Message:
-        """Read one message."""
+    def read(self, place: tuple[int, ...]) -> memoryview:
+        """Return the bytes of one message."""
         try:
-            asked = f"SELECT topic_id, {_TIME}, data FROM messages WHERE id = ?"
-            row = self._base.execute(asked, place[:1]).fetchone()
+            row = self._base.execute("SELECT data FROM messages WHERE id = ?", place[:1]).fetchone()
         except sqlite3.Error:
             row = None
-        if row is None or not isinstance(row[2], bytes):
+        if row is None or not isinstance(row[0], bytes):
             raise InputError(f"{self.path}: there is no whole message {place[0]}")
-        return Message(self._names.get(row[0], ""), row[1], place, memoryview(row[2]))
+        return memoryview(row[0])
 
 
 Bag = _Mcap | _Ros1 | _Sqlite

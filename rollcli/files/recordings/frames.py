@@ -139,7 +139,7 @@ def _add_maps(bag: BagFrames, found: _Found, topic: Topic, name: str) -> None:
     stated = 0.0
     for each in frames if has_doffs else ():
         with contextlib.suppress(InputError):  # a damaged one says so in its row
-            data = opened(each.location.partition("#")[0]).read(split_position(each.location)[1]).data
+            data = opened(each.location.partition("#")[0]).read(split_position(each.location)[1])
             stated = messages.baseline_of(topic, data)
             break
     if stated < 0 and right is None:
@@ -240,12 +240,12 @@ def read_frame(path: str, member: str, name: str) -> bytes | NDArray[Any]:
         place = _index(*state_of(path), topic_name).get(stamp, ())
     if not place:
         raise InputError(f"{name}: no such frame in {path}")
-    data, raw_of = bag.read(place[:2]).data, None
+    data, raw_of = bag.read(place[:2]), None
     info = bag.read(place[2:]) if len(place) == 4 else None
     with about(name):
         # depth maps, too, may be called image_raw
         if info is not None and not (searched and messages.is_map(topic, data)):
-            raw_of = messages.camera_info(Topic(info.topic, CAMERA_INFO, topic.encoding), info.data)
+            raw_of = messages.camera_info(Topic(_beside(topic_name), CAMERA_INFO, topic.encoding), info)
         return messages.content_of(topic, data, raw_of)
 
 
@@ -342,7 +342,7 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
             again = f".{seen[name]}" if seen[name] else ""  # a recorder may write a message twice
             if topic.name not in endings:
                 with contextlib.suppress(InputError):  # a damaged one says so in its row
-                    endings[topic.name] = messages.ending_of(topic, bag.read(message.place).data)
+                    endings[topic.name] = messages.ending_of(topic, bag.read(message.place))
             ending = endings.get(topic.name, ".npy")
             relative = f"{stem}_{stamp}{again.replace('.', '_')}{ending}"
             frames[topic.name].append(Input(f"{name}{again}#@{place}", relative, stamp))

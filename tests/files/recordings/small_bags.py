@@ -149,7 +149,7 @@ def _seen(data):
 
 def _alone(bag, place):
     try:
-        return _seen(bag.read(place).data)
+        return _seen(bag.read(place))
     except RollcliError as error:
         return type(error).__name__
 
