@@ -278,6 +278,8 @@ class _Mcap(_Chunked):
 
     def _head(self) -> _Head:
         opcode, length = struct.unpack("<BQ", _exactly(self._file, 9))
+        if not opcode:  # zeros, which a power cut leaves at the end of a file
+            raise _BrokenError
         if opcode in (0x02, 0x0F):  # footer, end of data
             return None, -1, "", 0
         after = self._file.tell() + length

@@ -299,6 +299,7 @@ CASES = {
         for lost in (150_000, 1_000)
     },
     "bag: mcap without an end": lambda: [_shortly(mcap(indexed=False)[:-lost]) for lost in (8, 37, 50)],
+    "bag: mcap and zeros": lambda: _shortly(mcap(indexed=False)[:-50] + bytes(99)),
     "bag: db3": lambda: [
         _read(_db3()),
         _read(_db3("UPDATE messages SET data = 'text' WHERE id = 2")),
