@@ -65,7 +65,7 @@ CONVENTIONS = {
 }
 
 _FURTHER = "further_columns"  # beside those of every result
-_DAMAGED = "damaged_calibrations"
+_DAMAGED = "damaged_calibrations"  # the frames whose own calibration could not be read
 _REPLACES = "replaces_images"  # while a run with --overwrite is not over
 _NUMBERS = ("scale", "num_disparities", "vertical_offset")  # options that are None by default
 Options = TypeVar("Options", EncodingOptions, ImageOptions, MethodOptions, RegionOptions, StereoOptions)
@@ -89,8 +89,8 @@ class RunRecord:
         fixed = {"rollcli": __version__, "options": _effective(plan), "inputs": names_of(plan.frames)}
         if options.calibration.given:
             fixed["calibration"] = _calibrations(plan.frames)
-            if damaged := dict.fromkeys(frame.damaged for frame in plan.frames if frame.damaged):
-                fixed[_DAMAGED] = list(damaged)
+            if damaged := [frame.file for frame in plan.frames if frame.damaged]:
+                fixed[_DAMAGED] = damaged
         if options.paired and (correction := options.stereo.correction) is not None:
             fixed["correction"] = correction.as_record()  # its file may be written anew
         return fixed
@@ -485,9 +485,8 @@ def _differences(kept: KeptRows, was: Mapping[str, Any] | None, record: RunRecor
     updates = not plan.options.result.in_parts
     again = "; --update does again what has changed" if updates else ""
     if isinstance(was.get(_DAMAGED), list):  # their rows are errors until --retry-failed, mended or not
-        damaged = set(map(_file_of, map(str, was[_DAMAGED])))
-        others = [each for each in frames if _file_of(getattr(each.calibration, "source", "")) not in damaged]
-        now = {**now, "calibration": _calibrations(others)}
+        damaged = set(map(str, was[_DAMAGED]))
+        now = {**now, "calibration": _calibrations([each for each in frames if each.file not in damaged])}
     if was.get("calibration") != json.loads(json.dumps(now.get("calibration"))):
         yield f"the calibration differs{again}"
     columns = list(plan.further)
@@ -513,11 +512,6 @@ def _differences(kept: KeptRows, was: Mapping[str, Any] | None, record: RunRecor
         also = {"right image": plan.options.paired, "mask": plan.options.region.mask}
         read = [kept.changed[0], *(f"its {each}" for each, given in also.items() if given)]
         yield f"{' or '.join(read)} has changed since{how}"
-
-
-def _file_of(said: str) -> str:
-    """Return the file of a calibration, from its source or from what is wrong with it."""
-    return said.partition(": ")[0].partition(", --")[0]
 
 
 _LISTS = {"encoding": str, "disparities_searched_px": int}
