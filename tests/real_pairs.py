@@ -19,7 +19,7 @@ def _needs(folder):
 needs_lidar, needs_maps, needs_roads, needs_streets = map(_needs, (LIDAR, REALMAPS, ROADS, STREETS))
 
 
-def real_pairs(which):
+def real_pairs(which, folder=LIDAR):
     """The left and the right views of a slice of the pairs, in the order of their names."""
-    named = sorted((LIDAR / "left").iterdir())[which]
-    return [tuple(read_image(str(LIDAR / side / left.name)) for side in ("left", "right")) for left in named]
+    named = sorted((folder / "left").iterdir())[which]
+    return [tuple(read_image(str(folder / side / left.name)) for side in ("left", "right")) for left in named]

@@ -10,8 +10,6 @@ import pytest
 from rollcli.errors import InputError
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.request import Request
-from rollcli.files.formats import read_image
-from rollcli.files.inputs import pair_inputs
 from rollcli.simulate.build import render_frame
 from rollcli.simulate.options import SimulateOptions
 from rollcli.simulate.spec import FrameSpec, draw_specs
@@ -325,8 +323,7 @@ def test_levelling_is_the_inverse_of_what_the_camera_did():
 def test_real_street_pairs_are_levelled_by_what_was_added(clockwise_deg, larger_percent, lower):
     odd = {"clockwise_deg": clockwise_deg, "larger_percent": larger_percent, "lower": lower}
     compared = 0
-    for views in pair_inputs(str(STREETS / "left"), str(STREETS / "right"))[::6]:
-        left, right = (read_image(view.location) for view in views)
+    for left, right in real_pairs(slice(None, None, 6), STREETS):
         as_it_is = match_pair(left, right, StereoOptions())
         match = match_pair(left, seen_by(right, **odd), StereoOptions())
 

@@ -17,7 +17,7 @@ from rollcli.simulate.spec import FrameSpec
 from rollcli.stereo import sgbm
 from rollcli.stereo.match import StereoOptions, compute_disparity, match_pair
 from tests.odd_views import pair_at, seen_by
-from tests.real_pairs import ROADS, ROLL_DEG, STREETS, needs_roads, needs_streets
+from tests.real_pairs import ROADS, ROLL_DEG, STREETS, needs_roads, needs_streets, real_pairs
 
 
 @pytest.fixture(scope="module")
@@ -204,8 +204,8 @@ def test_real_road_pairs_need_and_get_a_wide_range():
 @pytest.mark.slow
 @needs_streets
 def test_real_street_pairs_get_a_range_that_fits():
-    for left, right in pair_inputs(str(STREETS / "left"), str(STREETS / "right")):
-        match = match_pair(read_image(left.location), read_image(right.location), StereoOptions(downscale=2))
+    for left, right in real_pairs(slice(None), STREETS):
+        match = match_pair(left, right, StereoOptions(downscale=2))
 
         assert 32 <= match.num_disparities <= 112
         assert match.end_fraction < 0.03
