@@ -43,16 +43,19 @@ def surface_of(disparity, *, parabolic=True):
     return fit_surface(sample, find_road(sample, request), request)
 
 
-def found_in(height_at, roll_deg=0.0):
-    return surface_of(disparity_of(height_at, roll_deg))
+def found_in(height_at):
+    return surface_of(disparity_of(height_at))
 
 
-@pytest.mark.parametrize("roll_deg", [-8, 0, 3])
-def test_a_flat_road_has_its_roll_and_no_camber(roll_deg):
-    found = found_in(lambda x: 0 * x, roll_deg)
+@pytest.mark.parametrize(
+    ("roll_deg", "parabolic"), [(-8, True), (0, True), (3, True), (-8, False), (3, False)]
+)
+def test_a_flat_road_has_its_roll_and_no_camber_and_by_the_line_model_no_bend(roll_deg, parabolic):
+    found = surface_of(disparity_of(lambda x: 0 * x, roll_deg), parabolic=parabolic)
 
     assert math.degrees(found.model.theta) == pytest.approx(roll_deg, abs=0.02)
     assert found.model.camber == pytest.approx(0, abs=5e-4)
+    assert parabolic or found.model.alpha[2] == 0
 
 
 @pytest.mark.parametrize("kerb", [0.03, 0.06, 0.08, 0.1, 0.15])
@@ -158,14 +161,6 @@ def test_a_surface_that_crosses_the_road_without_rising_as_it_does_is_no_road():
     near = crossing & (np.abs(road - 15) < 0.6)
     assert near.sum() > 100
     assert covered[near].mean() < 0.1
-
-
-@pytest.mark.parametrize("roll_deg", [-8, 3])
-def test_the_line_model_finds_the_roll_of_a_flat_road_and_has_no_bend(roll_deg):
-    found = surface_of(disparity_of(lambda x: 0 * x, roll_deg), parabolic=False)
-
-    assert math.degrees(found.model.theta) == pytest.approx(roll_deg, abs=0.02)
-    assert found.model.alpha[2] == 0
 
 
 def test_pixels_that_do_not_lie_on_the_road_have_no_part_in_its_share():
