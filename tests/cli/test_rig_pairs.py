@@ -34,6 +34,19 @@ def columns(path):
     return json.loads(path.read_text())["columns"]
 
 
+def estimate(folder, right, name, *how):
+    """The rows NAME.csv of the left views with right ones of a folder."""
+    line = ("estimate", "--left", "left", "--right", right, *how, "-o", f"{name}.csv", "-q")
+    rollcli(*line, cwd=folder, status=0)
+
+
+def assert_as_level(folder, name):
+    """The angles of these rows must be those of the untouched pairs."""
+    apart = np.abs(rolls(folder / f"{name}.csv") - rolls(folder / "level.csv"))
+    assert np.median(apart) <= 0.02
+    assert apart.max() <= 0.08
+
+
 @pytest.fixture(scope="module")
 def pairs(tmp_path_factory):
     """Twelve pairs, the same with right views that are put off, and what was measured of these."""
@@ -43,9 +56,8 @@ def pairs(tmp_path_factory):
     (folder / "off").mkdir()
     for path in sorted((folder / "right").iterdir()):
         put_off(path, folder / "off")
-    for name, right in (("level", "right"), ("off", "off")):
-        done = rollcli("estimate", "--left", "left", "--right", right, "-o", f"{name}.csv", "-q", cwd=folder)
-        assert done.status == 0
+    estimate(folder, "right", "level")
+    estimate(folder, "off", "off")
     assert rollcli("rig", "off.csv", "--correction", "use.json", "-q", cwd=folder).status == 0
     return folder
 
@@ -120,9 +132,7 @@ def test_with_a_correction_the_angles_are_those_of_the_untouched_pairs(pairs):
     shutil.copy(pairs / "use.json", pairs / "again.json")
     given = ("--left", "left", "--right", "off", "--align", "again.json", "-o", "corrected.csv", "-q")
     assert rollcli("estimate", *given, cwd=pairs).status == 0
-    apart = np.abs(rolls(pairs / "corrected.csv") - rolls(pairs / "level.csv"))
-    assert np.median(apart) <= 0.02
-    assert apart.max() <= 0.08
+    assert_as_level(pairs, "corrected")
     (pairs / "again.json").unlink()  # what was corrected is in the record of the run
     for command in (("rig", "--correction", "../new.json"), ("report", "-o", "../new.html")):
         assert rollcli(*command, "../corrected.csv", cwd=pairs / "off").status == 0
@@ -137,16 +147,13 @@ def test_a_drive_tells_a_pitch_from_a_shift_and_levels_its_rows(pairs):
     for path in sorted((pairs / "right").iterdir()):
         pitched = seen_turned(cv2.imread(str(path), cv2.IMREAD_UNCHANGED), pitch_deg=0.3)
         cv2.imwrite(str(pairs / "pitched" / path.name), pitched)
-    given = ("--left", "left", "--right", "pitched", "-q")
-    assert rollcli("estimate", *given, "-o", "pitched.csv", cwd=pairs).status == 0
+    estimate(pairs, "pitched", "pitched")
     assert rollcli("rig", "pitched.csv", "--correction", "pitch.json", "-q", cwd=pairs).status == 0
-    assert rollcli("estimate", *given, "--align", "pitch.json", "-o", "unpitched.csv", cwd=pairs).status == 0
+    estimate(pairs, "pitched", "unpitched", "--align", "pitch.json")
 
     bend = json.loads((pairs / "pitch.json").read_text())["right_bend_px"]
     assert bend == pytest.approx(-math.radians(0.3) / (0.7 * 480) * 180**2, rel=0.1)
-    apart = np.abs(rolls(pairs / "unpitched.csv") - rolls(pairs / "level.csv"))
-    assert np.median(apart) <= 0.02
-    assert apart.max() <= 0.08
+    assert_as_level(pairs, "unpitched")
 
 
 def test_the_matrix_brings_the_right_view_back(pairs):
@@ -177,8 +184,7 @@ def test_a_pair_that_contradicts_the_correction_is_suspect(pairs):
 
 def test_maps_of_pairs_that_lie_as_the_correction_says_ask_for_nothing(pairs):
     first = ("--left", "left/frame_000[12].png", "--right", "off/frame_000[12].png")
-    done = rollcli("disparity", *first, "--align", "use.json", "-o", "maps_of_off", cwd=pairs)
-    assert done.status == 0
+    done = rollcli("disparity", *first, "--align", "use.json", "-o", "maps_of_off", cwd=pairs, status=0)
     assert "recalibrate" not in done.err
 
 
@@ -186,8 +192,7 @@ def test_a_drive_says_how_its_pairs_lie_and_not_what_an_earlier_correction_says(
     earlier = json.loads((pairs / "use.json").read_text())
     earlier["right_clockwise_deg"] -= 0.05
     (pairs / "earlier.json").write_text(json.dumps(earlier))
-    given = ("--left", "left", "--right", "off", "--align", "earlier.json", "-o", "later.csv", "-q")
-    assert rollcli("estimate", *given, cwd=pairs).status == 0
+    estimate(pairs, "off", "later", "--align", "earlier.json")
     assert rollcli("rig", "later.csv", "--correction", "later.json", "-q", cwd=pairs).status == 0
     later = json.loads((pairs / "later.json").read_text())
     assert all(abs(later[name] - truth) < NEAR[name] for name, truth in TRUTH.items())
@@ -197,8 +202,7 @@ def test_intervals_hold_where_right_views_have_grown_a_little_since_the_correcti
     (pairs / "grown").mkdir()
     for path in sorted((pairs / "right").iterdir()):
         put_off(path, pairs / "grown", larger=0.4)
-    given = ("--left", "left", "--right", "grown", "--align", "use.json", "-o", "grown.csv", "-q")
-    assert rollcli("estimate", *given, cwd=pairs).status == 0
+    estimate(pairs, "grown", "grown", "--align", "use.json")
     apart = np.abs(rolls(pairs / "grown.csv") - rolls(pairs / "level.csv"))
     half = [float(row["roll_ci95_deg"]) for row in rows_of((pairs / "grown.csv").read_text())]
     assert np.mean(apart <= half) >= 0.9

@@ -34,18 +34,20 @@ def pair(tmp_path_factory):
 
 
 def row_of(folder, *inputs, calib=("--calib", "calib.txt")):
-    done = rollcli("estimate", *inputs, *calib, "-o", "rolls.csv", "--overwrite", cwd=folder)
-    assert done.status == 0
+    rollcli("estimate", *inputs, *calib, "-o", "rolls.csv", "--overwrite", cwd=folder, status=0)
     return rows_of((folder / "rolls.csv").read_text())[0]
+
+
+def rows_of_pair_and_map(folder, *given, form="png", axis=(), **how):
+    """The row of the pair as it is asked for, and that of the map that `disparity` makes of it."""
+    line = ("disparity", *VIEWS, *given, *axis, "-o", form, "--overwrite", "--save-as", form)
+    rollcli(*line, cwd=folder, status=0)
+    return [row_of(folder, *inputs, *axis, **how) for inputs in ((*VIEWS, *given), (form,))]
 
 
 @pytest.mark.parametrize("form", ["png", "tiff"])
 def test_a_pair_and_its_map_give_the_same_row(pair, form):
-    folder, _, _ = pair
-    of_pair = row_of(folder, *VIEWS)
-    out = f"maps-{form}"
-    assert rollcli("disparity", *VIEWS, "-o", out, "--save-as", form, cwd=folder).status == 0
-    of_map = row_of(folder, out)
+    of_pair, of_map = rows_of_pair_and_map(pair[0], form=form)
 
     assert float(of_pair["roll_ci95_deg"]) > 0.03  # of which levelling is the most
     assert of_map["message"] == of_pair["message"]
@@ -63,9 +65,8 @@ def test_a_yaw_is_about_the_principal_point_in_a_pair_and_in_its_map(tmp_path):
     right = seen_turned(frame.right, yaw_deg=0.3)
     write_views(tmp_path, "a.png", frame.left[60:540, :640], right[60:540, :640])
     axis = ("--focal", str(spec.focal), "--principal-point", "399.5,239.5")
-    assert rollcli("disparity", *VIEWS, *axis, "-o", "maps", "--save-as", "tiff", cwd=tmp_path).status == 0
 
-    of_pair, of_map = (row_of(tmp_path, *inputs, *axis, calib=()) for inputs in (VIEWS, ("maps",)))
+    of_pair, of_map = rows_of_pair_and_map(tmp_path, form="tiff", axis=axis, calib=())
 
     assert float(of_pair["roll_deg"]) == pytest.approx(3, abs=0.06)
     assert float(of_map["roll_deg"]) == pytest.approx(float(of_pair["roll_deg"]), abs=0.01)
@@ -74,11 +75,7 @@ def test_a_yaw_is_about_the_principal_point_in_a_pair_and_in_its_map(tmp_path):
 @pytest.mark.parametrize(("form", "downscale"), [("png", "2"), ("tiff", "1.3")])
 def test_a_map_of_shrunk_views_has_the_pose_of_its_pair(pair, form, downscale):
     """The calibration states no size: that of the images is in the file of the map."""
-    folder, _, _ = pair
-    views, out = (*VIEWS, "--downscale", downscale), f"shrunk-{form}"
-    of_pair = row_of(folder, *views)
-    assert rollcli("disparity", *views, "-o", out, "--save-as", form, cwd=folder).status == 0
-    of_map = row_of(folder, out)
+    of_pair, of_map = rows_of_pair_and_map(pair[0], "--downscale", downscale, form=form)
     assert float(of_map["height_m"]) == pytest.approx(float(of_pair["height_m"]), rel=1e-3)
     for value, half in (("roll_deg", "roll_ci95_deg"), ("pitch_deg", "pitch_ci95_deg")):
         assert abs(float(of_map[value]) - float(of_pair[value])) < float(of_pair[half]) / 2
@@ -119,9 +116,7 @@ def test_a_map_of_a_pair_whose_right_camera_is_rolled_has_the_pitch_of_its_pair(
     spec = FrameSpec(scene="open", pitch=0.07, principal_point=(319.5, 200.0), seed=12, colour=False)
     write_views(tmp_path, "a.png", render_frame(spec).left, seen_rolled(spec, 0.5))
     (tmp_path / "calib.txt").write_bytes(dataset.calibration(spec))
-    of_pair = row_of(tmp_path, *VIEWS)
-    assert rollcli("disparity", *VIEWS, "-o", "maps", cwd=tmp_path).status == 0
-    of_map = row_of(tmp_path, "maps")
+    of_pair, of_map = rows_of_pair_and_map(tmp_path)
 
     assert float(of_pair["pitch_deg"]) == pytest.approx(math.degrees(spec.pitch), abs=0.03)
     assert float(of_map["pitch_deg"]) == pytest.approx(float(of_pair["pitch_deg"]), abs=0.005)

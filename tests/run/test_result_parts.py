@@ -12,11 +12,11 @@ from tests.run_cli import contents, leave_half, rollcli, write_maps
 
 @pytest.fixture
 def parts(tmp_path):
-    """A whole result of three parts, and the command that made it."""
+    """A whole result of three parts, the command that made it, and what there is."""
     line = ("estimate", "maps", "-o", "rolls.parquet", "--part-rows", "2")
     write_maps(tmp_path / "maps", 6)
     assert rollcli(*line, cwd=tmp_path).status == 0
-    return tmp_path, line
+    return tmp_path, line, contents(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -25,8 +25,7 @@ def parts(tmp_path):
 )
 @pytest.mark.parametrize("flag", ["--resume", "--overwrite"])
 def test_half_a_part_of_a_killed_run_is_removed(parts, half_written, flag):
-    folder, line = parts
-    whole = contents(folder)
+    folder, line, whole = parts
     (folder / "rolls.parquet" / "part-00002.parquet").unlink()
     leave_half(folder / f"rolls.{half_written}")
     assert len(contents(folder)) == len(whole)
@@ -38,8 +37,7 @@ def test_half_a_part_of_a_killed_run_is_removed(parts, half_written, flag):
 
 @pytest.mark.parametrize(("gone", "kept"), [((1, 2), 2), ((0,), 4), ((0, 1), 2)])
 def test_a_full_disk_keeps_the_other_parts_and_says_how_to_go_on(parts, gone, kept, monkeypatch):
-    folder, line = parts
-    whole = contents(folder)
+    folder, line, whole = parts
     for number in gone:
         (folder / "rolls.parquet" / f"part-0000{number}.parquet").unlink()
 
@@ -48,8 +46,7 @@ def test_a_full_disk_keeps_the_other_parts_and_says_how_to_go_on(parts, gone, ke
 
     with monkeypatch.context() as patch:
         patch.setattr(batch, "create", no_room)
-        done = rollcli(*line, "--resume", "-j", "1", cwd=folder)
-    assert done.status == 1
+        done = rollcli(*line, "--resume", "-j", "1", cwd=folder, status=1)
     assert done.err.endswith(
         f"rollcli: rolls.parquet/part-0000{gone[0]}.parquet: cannot be written: no space left on device; "
         f"{kept} rows are kept, continue with --resume\n"
@@ -61,8 +58,7 @@ def test_a_full_disk_keeps_the_other_parts_and_says_how_to_go_on(parts, gone, ke
 @pytest.mark.parametrize(("path", "fails"), [("maps/frame3.png", "odd"), ("rolls.parquet", "all")])
 @pytest.mark.parametrize("flag", ["--overwrite", "--resume"])
 def test_a_momentary_fault_of_the_disk_does_not_keep_a_run_from_resume(parts, path, fails, flag, monkeypatch):
-    folder, line = parts
-    whole = contents(folder)
+    folder, line, whole = parts
     (folder / "rolls.parquet" / "part-00001.parquet").unlink()
     look, asked = os.stat, []
 
