@@ -155,15 +155,13 @@ def run_with_deaths(maps, deadly, times, arguments=ESTIMATE):
 
 def test_a_worker_that_dies_once_costs_nothing(maps):
     rollcli("estimate", "maps", "-o", "undisturbed.csv", "-q", cwd=maps)
-    done = run_with_deaths(maps, ["frame3", "frame8"], 1)
-    assert done.status == 0
+    assert run_with_deaths(maps, ["frame3", "frame8"], 1).status == 0
     assert len(list(maps.glob("died-of-*"))) == 2
     assert (maps / "rolls.csv").read_bytes() == (maps / "undisturbed.csv").read_bytes()
 
 
 def test_a_frame_that_kills_its_worker_twice_is_an_error_row_and_the_batch_goes_on(maps):
-    done = run_with_deaths(maps, ["frame3"], 99)
-    assert done.status == 3
+    assert run_with_deaths(maps, ["frame3"], 99).status == 3
     deaths = len(list(maps.glob("died-of-*")))
     assert 2 <= deaths <= 2 + math.ceil(math.log2(FRAMES))  # its chunk is halved until it is alone
     rows = list(parse_rows((maps / "rolls.csv").read_bytes(), "rolls.csv"))

@@ -95,8 +95,7 @@ def test_a_retry_that_is_interrupted_keeps_what_it_has_done_and_is_taken_up_agai
     mend(folder, maps, *BROKEN)
     with monkeypatch.context() as patch:
         interrupt_in(patch, batch, "do_frame")
-        done = rollcli(*line, *RETRY, cwd=folder)
-    assert done.status == 130
+        done = rollcli(*line, *RETRY, cwd=folder, status=130)
     assert "interrupted; continue with: rollcli estimate maps" in done.err
     statuses = [row.status for row in read_result(folder / "rolls.csv").rows]
     assert [statuses[index] for index in BROKEN] == ["ok", "error", "error"]

@@ -26,15 +26,10 @@ def put(folder, *names, roll=0.1):
         write_kitti(folder / "maps" / f"{name}.png", road_map(roll, seed=len(name)))
 
 
-def touch(folder, older=False):
+def touch(folder):
     """Give every map another time, as a checkout or a cache does."""
     for number, path in enumerate((folder / "maps").iterdir()):
-        os.utime(path, ns=(0, 10**9 * (number + (1 if older else 2**31))))
-
-
-def written(folder):
-    """What a run writes, but the lines of the inputs' states."""
-    return contents(folder, without="maps")
+        os.utime(path, ns=(0, 10**9 * (number + 2**31)))
 
 
 def inodes(folder):
@@ -52,7 +47,7 @@ def anew(folder, tmp_path_factory, result):
     other = tmp_path_factory.mktemp("anew")
     (other / "maps").symlink_to(folder / "maps")
     estimate(other, *IMAGES, status=3, result=result)
-    return written(other)
+    return contents(other, without="maps")
 
 
 @pytest.mark.parametrize("form", mostly_slow(["csv", "parquet"], "csv"))
@@ -99,7 +94,7 @@ def test_an_update_does_what_has_changed_and_nothing_else(folder, tmp_path_facto
     assert "done again, since what they were made from has changed: 2" in done.err
     assert "(6 kept)" in done.err
     fresh = anew(folder, tmp_path_factory, result)
-    assert {name: data for name, data in written(folder).items() if name in fresh} == fresh
+    assert {name: data for name, data in contents(folder).items() if name in fresh} == fresh
     assert {name for name, inode in inodes(folder).items() if before[name] != inode} == {
         "frame0.png",
         "frame5.png",
