@@ -65,10 +65,6 @@ def _crowned(camber=0.06):
     return np.where(found > 0, found * (1 - camber * (_across() / 90) ** 2) + _noise(0.1), 0)
 
 
-def _two_roads():
-    return np.where(_across() < 0, _noisy(8, 0.1), _noisy(-8, 0.1))
-
-
 def _sweep():
     found = _noisy(2, 0.1)
     found[np.arange(HEIGHT) % 4 != 0] = 0
@@ -92,7 +88,7 @@ MAPS = {
     "tree": _tree,
     "crowned": _crowned,
     "dished": lambda: _crowned(-0.12),
-    "two roads": _two_roads,
+    "two roads": lambda: np.where(_across() < 0, _noisy(8, 0.1), _noisy(-8, 0.1)),
     "sweep": _sweep,
     "kerb": _kerb,
     "very noisy": lambda: _noisy(9, 1.5),

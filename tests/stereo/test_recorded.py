@@ -86,15 +86,6 @@ def _drive():
     return {"columns": parts.shifts(*SIZE[::-1]), "slope_error_px": told.error * SIZE[0]}
 
 
-def _swapped():
-    left, right = _scene()
-    return right, left
-
-
-def _other():
-    return _scene()[0], _scene("open", 9)[1]
-
-
 FULL, HIGH = partial(_scene, size=(448, 320), focal=300.0), partial(_scene, size=(192, 304), focal=160.0)
 ODD = {"clockwise_deg": 0.6, "larger_percent": 0.8, "lower": -3.0}
 LIES = Misalignment(1.5, 0.01, -0.004, 2e-5, 0.02, 1e-5)
@@ -169,8 +160,8 @@ CASES = {
     "texture": partial(_match, _texture),
     "texture of a slope": partial(_match, partial(_texture, 4.0, 0.3), {"lower": 1.0}),
     "a drive": _drive,
-    "swapped": partial(_match, _swapped),
-    "two scenes": partial(_match, _other),
+    "swapped": partial(_match, lambda: _scene()[::-1]),
+    "two scenes": partial(_match, lambda: (_scene()[0], _scene("open", 9)[1])),
     "one image": partial(_match, lambda: (_scene()[0],) * 2),
     "levelled": lambda: [_levelled(None), _levelled(seen_from_right(_NEAR))],
     "seen from the right": lambda: seen_from_right(_NEAR),
