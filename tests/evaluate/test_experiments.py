@@ -9,20 +9,12 @@ import pytest
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.solvers.exact import exact
-from rollcli.evaluate.experiments import (
-    FORMS,
-    METHODS,
-    SOLVERS,
-    Times,
-    _best,
-    examine,
-    rotate_nearest,
-    time_solvers,
-)
+from rollcli.evaluate.experiments import METHODS, SOLVERS, _best, examine, rotate_nearest, time_solvers
 from rollcli.evaluate.paper_tables import DELTAS_DEG, all_tables, column
 from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of
 
 TURNS = [math.radians(turn) for turn in (-10, 0, 15)]
+TWO_ROWS = np.array([[20.0, 20.3], [20.4, 20.6]])  # of pixels, which determine no parabola
 
 
 @pytest.fixture(scope="module")
@@ -66,17 +58,14 @@ def test_a_map_without_an_angle_is_refused():
         examine("a", np.zeros((50, 60)), TURNS, None, chosen=False)
 
 
-def made_times(seconds):
-    return Times(9, {(solver, form): (seconds,) * 4 for solver in ("gss", "gd") for form in FORMS})
-
-
 def test_runs_that_stopped_short_are_left_out_of_the_mean_and_counted(found):
     short = replace(found, sweep=tuple((None, *counts[1:]) for counts in found.sweep))
     slower = replace(found, sweep=tuple(tuple(count and count + 4 for count in each) for each in found.sweep))
-    table = all_tables([found, slower], [], [made_times(1)])["fig3_lambda0"]
+    times = [time_solvers(TWO_ROWS)]
+    table = all_tables([found, slower], [], times)["fig3_lambda0"]
     for name, more in (("mean", 2), ("min", 0), ("max", 4)):
         assert column(table, name, lambda0=26.0) == [counts[25] + more for counts in found.sweep]
-    table = all_tables([found, short], [], [made_times(1)])["fig3_lambda0"]
+    table = all_tables([found, short], [], times)["fig3_lambda0"]
     # the whole numbers that the command's help names
     assert column(table, "lambda0", delta_deg=DELTAS_DEG[0]) == list(range(1, 101))
     (row,) = (each for each in table if (each["lambda0"], each["delta_deg"]) == (1.0, 0.0001))
@@ -90,5 +79,4 @@ def test_a_time_is_that_of_the_fastest_run():
 
 
 def test_solvers_are_timed_on_pixels_of_two_rows_which_determine_no_parabola():
-    two_rows = np.array([[20.0, 20.3], [20.4, 20.6]])
-    assert examine("a", two_rows, [0.0], None, chosen=False).pixels == time_solvers(two_rows).pixels == 4
+    assert examine("a", TWO_ROWS, [0.0], None, chosen=False).pixels == time_solvers(TWO_ROWS).pixels == 4
