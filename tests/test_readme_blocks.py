@@ -13,16 +13,7 @@ import pytest
 
 from rollcli import assess_rig
 from tests.readme_tables import commands
-from tests.run_cli import (
-    ROOT,
-    contents,
-    keep_rows,
-    road_map,
-    rollcli,
-    rollcli_process,
-    write_kitti,
-    write_program,
-)
+from tests.run_cli import ROOT, contents, keep_rows, road_map, rollcli, write_kitti, write_program
 from tests.test_readme import PAGES, README, make
 
 COMMANDS = dict(commands())
@@ -219,8 +210,7 @@ def test_a_bucket(tmp_path, bucket):
     pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
     write_bytes(f"{bucket}/run7/frame_0001.png", (SAMPLES / "maps" / "frame_0001.png").read_bytes())
     words = shlex.split(block("rollcli estimate s3://").replace("s3://drives", bucket))[1:]
-    done = rollcli_process(*words, cwd=tmp_path)
-    assert done.status == 0, done.err
+    rollcli(*words, cwd=tmp_path, status=0)
     assert list(list_names(f"{bucket}/run7-level")) == ["frame_0001.png"]
     assert [name for name in list_names(f"{bucket}/run7.parquet") if name.endswith(".parquet")]
 

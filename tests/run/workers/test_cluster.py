@@ -156,14 +156,9 @@ def start(far, scheduler):
     return subprocess.Popen(line, cwd=far, env=environment(), stderr=subprocess.PIPE, text=True)
 
 
-def wait_for_images(far, run):
-    """Until some frames are done."""
-    wait_until(lambda: len(list(far.glob("v/[!.]*.png"))) > 8, run)
-
-
 def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_a_local_run(local, far, scheduler, workers):
     run = start(far, scheduler)
-    wait_for_images(far, run)
+    wait_for_files(far, "v/[!.]*.png", 9, run)
     workers[0].kill()
     _, err = run.communicate(timeout=120)
     assert run.returncode == 3, err
@@ -191,7 +186,7 @@ def test_conversions_on_a_cluster_give_the_bytes_of_a_local_run(tmp_path, schedu
 
 def test_a_scheduler_that_is_lost_ends_the_run_which_goes_on_without_it(local, far, cluster_here, workers):
     run = start(far, cluster_here.address)
-    wait_for_images(far, run)
+    wait_for_files(far, "v/[!.]*.png", 9, run)
     cluster_here.process.kill()
     _, err = run.communicate(timeout=60)
     assert run.returncode == 1
@@ -235,7 +230,7 @@ def test_a_worker_that_joins_later_and_cannot_take_part_gets_no_work_also_when_a
     for number in range(400):  # so many that the worker is there before the end
         shutil.copy(local / "maps" / "frame0.png", far / "maps" / f"more{number:03}.png")
     run = start(far, scheduler)
-    wait_for_images(far, run)
+    wait_for_files(far, "v/[!.]*.png", 9, run)
     joined_late = cluster_here.dask("worker", odd, scheduler, *ONE_PROCESS, "--preload", "preload.py")
     try:
         said = next(line for line in run.stderr if "gets no work" in line)
