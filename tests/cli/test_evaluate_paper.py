@@ -30,10 +30,6 @@ def paper(folder, *arguments):
     return rollcli("evaluate", "paper", "maps", "-o", "out", *FAST, *arguments, cwd=folder)
 
 
-def read(path):
-    return rows_of(path.read_text())
-
-
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
     folder = tmp_path_factory.mktemp("paper")
@@ -85,7 +81,8 @@ def test_pixels_outside_of_the_region_count_for_nothing(tmp_path):
     (tmp_path / "truth.csv").write_text("file,roll_deg\na,-3\n")
     corners = "45,0 159,0 159,119 45,119"
     assert paper(tmp_path, "--truth", "truth.csv", "--polygon", corners, "-q").status == 0
-    exact = [row for row in read(tmp_path / "out/fig6_accuracy.csv") if row["solver"] == "exact"]
+    rows = rows_of((tmp_path / "out/fig6_accuracy.csv").read_text())
+    exact = [row for row in rows if row["solver"] == "exact"]
     assert float(exact[0]["mean_deg"]) == pytest.approx(0, abs=0.05)
 
 

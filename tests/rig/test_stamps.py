@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rollcli.files.results import Row
+from rollcli.files.results import Row, format_row
 from rollcli.report.charts import all_charts
 from rollcli.rig.drive.assess import assess_rig
 from tests.run_cli import rollcli
@@ -29,8 +29,6 @@ def rows(count=600, rate=RATE, name=NAME, start=START, every_s=1.0):
 
 @pytest.mark.slow
 def test_rig_says_the_drift_an_hour_in_words_and_in_json(tmp_path):
-    from rollcli.files.results import format_row
-
     _, given = rows()
     lines = b"".join(format_row(each, "jsonl", ()) for each in given)
     (tmp_path / "rolls.jsonl").write_bytes(lines)

@@ -121,11 +121,7 @@ def test_an_area_of_which_half_is_valid_is_enough():
 def default_area(shape):
     """The rows and columns that are documented."""
     height, width = shape
-    rows, columns = (
-        slice(round(0.6 * height), round(0.9 * height)),
-        slice(round(0.35 * width), round(0.65 * width)),
-    )
-    return rows, columns
+    return slice(round(0.6 * height), round(0.9 * height)), slice(round(0.35 * width), round(0.65 * width))
 
 
 def plane_of(disparity):
