@@ -156,7 +156,7 @@ def _decoded_parts(page: Any, shape: tuple[int, ...], part: tuple[int, int], dat
 
 SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _WHITE_IS_ZERO, _RGB, _PALETTE, _LUMA_CHROMA = 0, 2, 3, 6
-_OPACITY = (1, 2)  # what a further channel may be
+_OPACITY = ((1,), (2,))  # what the channels beside grey may be
 _CHUNKY = 1
 _LARGE_TILE = 2**22  # pixels; a small image may lie in one large tile
 _NOT_A_PAGE_OF_ITS_OWN = 0b101  # a reduced copy, or a mask, of another page
@@ -186,7 +186,7 @@ def picture(data: bytes) -> NDArray[Any]:
         # tifffile turns the luma and chroma of JPEG into RGB
         as_rgb = page.photometric == _RGB or (page.photometric, page.compression) == (_LUMA_CHROMA, _JPEG)
         colour = as_rgb and page.samplesperpixel >= 3
-        grey = page.samplesperpixel == 1 or (page.samplesperpixel == 2 and page.extrasamples[0] in _OPACITY)
+        grey = page.samplesperpixel == 1 or (page.samplesperpixel == 2 and page.extrasamples in _OPACITY)
         if not (colour or grey) or page.photometric == _PALETTE:
             raise InputError("is neither a grey nor an RGB TIFF")
         pixels = _pixels(page, data)
