@@ -108,11 +108,11 @@ def calibration_finder(given: CalibrationOptions) -> Callable[[str], Calibration
     fetched = fetch_all(filter(is_url, files), MAX_BYTES)  # one after the other takes long
 
     @cache  # one may be for a thousand frames
-    def read(path: str) -> Calibration:
+    def read(path: str) -> Calibration | InputError:
         try:
             return _read([path], given, fetched)
-        except UsageError as error:  # which is of its own frames alone
-            raise InputError(str(error)) from error
+        except (InputError, UsageError) as error:  # which is of its own frames alone
+            return InputError(str(error))
 
     def of(name: str) -> Calibration | None:
         if _is_broken(name):
@@ -120,7 +120,10 @@ def calibration_finder(given: CalibrationOptions) -> Callable[[str], Calibration
         stem = _stem(name)
         while stem not in by_stem and "_" in stem:  # KITTI's 000010.txt is for 000010_10.png
             stem = stem.rpartition("_")[0]
-        return read(_only(by_stem, stem, "calibration", name, given.calib[0]))
+        found = read(_only(by_stem, stem, "calibration", name, given.calib[0]))
+        if isinstance(found, InputError):
+            raise found.with_traceback(None)
+        return found
 
     return of
 

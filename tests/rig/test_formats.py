@@ -11,7 +11,7 @@ import pytest
 from rollcli.errors import InputError, RollcliError
 from rollcli.rig.calibration import CalibrationOptions
 from rollcli.rig.read_calibration import parse_calibration
-from rollcli.run.find import read_calibration
+from rollcli.run.find import calibration_finder, read_calibration
 from tests.rig import calibration_files as samples
 from tests.rig.calibration_files import Rig
 
@@ -109,6 +109,11 @@ def test_bytes_that_are_no_text_and_large_files_are_refused(tmp_path):
         (tmp_path / "c").write_bytes(data)
         with pytest.raises(InputError, match=reason):
             read_calibration(tmp_path / "c")
+    find = calibration_finder(CalibrationOptions(calib=(str(tmp_path),)))
+    for name in ("c_1", "c_2"):  # of a thousand frames it is read once
+        with pytest.raises(InputError, match="up to 1 MB"):
+            find(name)
+        (tmp_path / "c").write_text(ROS_HEAD)
 
 
 ROS_HEAD = "projection_matrix:\n"
