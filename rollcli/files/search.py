@@ -189,7 +189,7 @@ class Search:
             wanted = _without_views(argument.rstrip("/"), wanted)
         first = next(wanted, None)
         if first is None:
-            hint = self._in_place_of_inputs(argument) if kind == "folder" else ""
+            hint = self._in_place_of_inputs(argument.rstrip("/") or "/") if kind == "folder" else ""
             hint = f"; {LEAVE_NONE}" if found else hint
             endings = " ".join(self.endings) or "of any ending"
             raise UsageError(f"{argument}: no input found in this {kind} ({endings}){hint}")
