@@ -100,11 +100,13 @@ class RunSummary:
         """The exit status of a run that came to its end."""
         return ExitStatus.FRAMES_FAILED if self.counts["error"] else ExitStatus.DONE
 
-    def alignment(self, told: Correction | None = None) -> dict[str, float | int | str] | None:
+    def alignment(
+        self, told: Correction | None = None, *, matched: bool = True
+    ) -> dict[str, float | int | str] | None:
         """Return the medians of how the views lay, for the run's record; None where no pair was measured.
 
         Their `advice` is what to do about it, in a sentence; empty where the median is level, or lies as a
-        correction that was `told` says.
+        correction that was `told` says, and where this run has not `matched` them: what did has told it.
         """
         lay = {name: self._median(name) for name in ALIGNMENT_COLUMNS}
         frames = len(self._known(ALIGNMENT_COLUMNS[0]))
@@ -114,7 +116,7 @@ class RunSummary:
         if told is not None and frames and width and height:
             level = told.resized(width, height).lies.values(height, width)
             left = [value - known for value, known in zip(left, level, strict=True)]
-        advice = advice_of(*left)
+        advice = advice_of(*left) if matched else ""
         return {"frames": frames, **rounded, "advice": advice} if frames else None
 
     def rig_roll(self) -> str:
@@ -328,7 +330,7 @@ class Progress(TaskProgress):
         super().__init__(total, options.running)
         self.summary = summary or RunSummary()
         self.kept = self.summary.frames
-        self._statuses, self._told = statuses, options.stereo.correction
+        self._statuses, self._told, self._matched = statuses, options.stereo.correction, options.paired
         self._auto = options.encoding.encoding == "auto" and options.encoding.scale is None
         self._failures, self._warnings = Causes(), Causes()
 
@@ -381,6 +383,6 @@ class Progress(TaskProgress):
         by_status = [f"{counts[status]} {status}" for status in self._statuses]
         by_status.append(f"{counts['error']} failed")
         self.note(f"{self.frames()}: {', '.join(by_status)}; {self.seconds:.1f} s, {self.speed()}")
-        if advice := (self.summary.alignment(self._told) or {}).get("advice"):
+        if advice := (self.summary.alignment(self._told, matched=self._matched) or {}).get("advice"):
             beside = "" if self._told is None else "beside what --align says, "
             self.note(f"median over the pairs: {beside}{advice}")

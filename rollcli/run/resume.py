@@ -126,13 +126,14 @@ class RunRecord:
         if not self.plan.files:
             return
         self.check_owned()
+        told, matched = self.plan.options.stereo.correction, self.plan.options.paired
         record = {
             **self.fixed,
             _FURTHER: list(self.plan.further),
             "encoding": sorted(self.read_as.encodings),
             "disparities_searched_px": list(self.read_as.searched or ()),
             **({"downscale": self.read_as.downscale} if self.read_as.downscale > 1 else {}),
-            "alignment": summary and summary.alignment(self.plan.options.stereo.correction),
+            "alignment": summary and summary.alignment(told, matched=matched),
             "conventions": CONVENTIONS,
             "counts": summary.totals if summary else {},
             **({_REPLACES: True} if self.replaces and not summary else {}),

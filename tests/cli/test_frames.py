@@ -36,6 +36,8 @@ def test_a_pair_whose_views_are_not_level_is_corrected_and_says_so(tmp_path):
     assert column(done.out, "message") == [""]
     assert float(column(done.out, "roll_deg")[0]) == pytest.approx(np.degrees(0.05), abs=0.3)
     assert re.search(r"median over the pairs: the right image lies \d\.\d\d px lower: recalibrate", done.err)
+    assert "recalibrate" in rollcli("disparity", *pair, "-o", "maps", cwd=tmp_path).err
+    assert "recalibrate" not in rollcli("estimate", "maps", cwd=tmp_path).err
     for untouched in (("--vertical-offset", "1"), ("--align", "off")):
         assert column(rollcli("estimate", *pair, *untouched, cwd=tmp_path).out, "right_lower_px") == [""]
     given = rollcli("estimate", *pair, "--vertical-offset", "1", cwd=tmp_path)
