@@ -113,7 +113,9 @@ def _rows(text: str, path: str | Path) -> Iterator[tuple[str, str, KnownPose]]:
 
 
 def _known(line: Mapping[str, str], where: str) -> KnownPose:
-    given = {n: _number(line[n], n, where) for n in _NUMBERS if line.get(n) or n == "roll_deg"}
+    given = {
+        name: _number(line[name], name, where) for name in _NUMBERS if line.get(name) or name == "roll_deg"
+    }
     bends = given.get("curvature_per_m", 0.0) != 0
     pitch, height = (None if bends else given.get(name) for name in ("pitch_deg", "height_m"))
     rig = [given[name] for name in ("focal_px", "baseline_m") if name in given]

@@ -119,7 +119,9 @@ def subjects(
         The record of a run is none.
     """
     there = None if images is None else _ImageFolder(images)
-    runs = [(recorded_options(p.run, run_path(p.path)), recorded_calibrations(p.run)) for p in parts]
+    runs = [
+        (recorded_options(part.run, run_path(part.path)), recorded_calibrations(part.run)) for part in parts
+    ]
     found = []
     for owner, row in chosen:
         result, (options, calibrations) = parts[owner].path, runs[owner]
