@@ -326,6 +326,8 @@ class _Ros1(_Chunked):
 
     def _head(self) -> _Head:
         if self._file.tell() == self._size:  # no record says that it is the last
+            if not 0 < self._index() <= self._size:  # nor has a recorder ended the file
+                raise _BrokenError
             return None, -1, "", 0
         fields = _fields(_exactly(self._file, self._length()))
         after = self._length() + self._file.tell()
