@@ -33,7 +33,8 @@ REMEDIES = {
     "encoding": ("--encoding {name} (stored / {by})", "the numbers / {by}"),
     "scale": ("--scale, the pixels that a stored number of 1 stands for", "pixels"),
 }
-_UPSIDE_DOWN = "upside down: reverse the order of its rows"
+# rows alone would mirror what a camera saw that hung, and its roll would have the other sign
+_UPSIDE_DOWN = "upside down: reverse the order of its rows; if the camera hung, that of its columns, too"
 
 
 @dataclass(frozen=True)
