@@ -49,10 +49,14 @@ class BagFrames:
 
 @dataclass(frozen=True)
 class _Found:
-    """The frames of some topics, the CameraInfo of cameras and their places, and what is broken."""
+    """The frames of some topics, the CameraInfo of cameras and their places, and what is broken.
+
+    `changes`: of cameras whose later CameraInfo is another one, the stamp of the first of these.
+    """
 
     frames: dict[str, list[Input]]
     cameras: dict[str, CameraInfo]
+    changes: dict[str, int]
     places: dict[tuple[str, str], str]
     broken: list[Input]
 
@@ -144,7 +148,7 @@ def _add_maps(bag: BagFrames, found: _Found, topic: Topic, name: str) -> None:
             break
     if stated < 0 and right is None:
         bag.notes.append(f"{name}: {topic.name} states a baseline T of {stated:g} m: taken as {-stated:g} m")
-    _calibrate(bag, left, right, abs(stated), name)
+    _calibrate(bag, found, left, right, abs(stated), name)
     if bag.calibration is None and (found.cameras or has_doffs):
         lacks = _NO_LEFT if any(each.usable for each in found.cameras.values()) else _NO_P
         bag.uncalibrated.append(f"{name}: {lacks}")
@@ -178,7 +182,8 @@ def _add_pairs(
         if alone := [f"@{each.stamp}" for at, each in enumerate(views) if at not in paired]:
             without = f"{len(alone)} {side} views have no partner {within}"
             bag.notes.append(f"{name}: {without} and are left out: {listed(alone)}")
-    _calibrate(bag, found.cameras.get(_beside(left)), found.cameras.get(_beside(right)), 0.0, name)
+    one, other = (found.cameras.get(_beside(each)) for each in (left, right))
+    _calibrate(bag, found, one, other, 0.0, name)
     if bag.calibration is None and found.cameras:
         bag.uncalibrated.append(f"{name}: {_beside(left)} is {_NO_P}")
 
@@ -318,6 +323,8 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
     infos = {each.name for each in _decodable(topics, CAMERA_INFO)}
     frames: dict[str, list[Input]] = {each: [] for each in by_name}
     cameras: dict[str, CameraInfo] = {}
+    firsts: dict[str, memoryview] = {}
+    changes: dict[str, int] = {}
     places: dict[tuple[str, str], str] = {}
     broken = []
     seen: dict[str, int] = {}
@@ -328,13 +335,19 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
         for message in bag.messages({*by_name, *infos}, by_name):
             place = "{}+{}".format(*message.place)
             if (topic := by_name.get(message.topic)) is None:
-                if (path, message.topic) not in places:
-                    with contextlib.suppress(InputError):  # the next one says the same
-                        info = messages.camera_info(topics[message.topic], message.data)
-                        if info.has_p:  # a driver may write zeros until its calibration is loaded
-                            places[path, message.topic] = place
-                        if not (message.topic in cameras and cameras[message.topic].has_p):
-                            cameras[message.topic] = info
+                camera, content = message.topic, message.data[12:]  # behind the stamp
+                if (path, camera) in places and (content == firsts[camera] or camera in changes):
+                    continue
+                with contextlib.suppress(InputError):  # the next one says the same
+                    info = messages.camera_info(topics[camera], message.data)
+                    if info.has_p:  # a driver may write zeros until its calibration is loaded
+                        places.setdefault((path, camera), place)
+                        firsts.setdefault(camera, content)
+                    if not (camera in cameras and cameras[camera].has_p):
+                        cameras[camera] = info
+                    elif info.has_p and info != cameras[camera]:
+                        stamp = messages.stamp_of(topics[camera], message.data, message.log_time)
+                        changes.setdefault(camera, stamp)
                 continue
             stamp = messages.stamp_of(topic, message.data, message.log_time)
             name = f"{path}#{topic.name}@{stamp}"
@@ -350,7 +363,7 @@ def _scan(files: Sequence[str], wanted: Sequence[Topic], topics: dict[str, Topic
             broken.append(_rest(path))
     for each in frames.values():  # a recorder writes messages as they come in
         each.sort(key=attrgetter("stamp"))
-    return _Found(frames, cameras, places, broken)
+    return _Found(frames, cameras, changes, places, broken)
 
 
 def _beside(topic: str) -> str:
@@ -381,9 +394,19 @@ def _cameras(found: _Found, topic: str) -> tuple[CameraInfo | None, CameraInfo |
 
 
 def _calibrate(
-    bag: BagFrames, left: CameraInfo | None, right: CameraInfo | None, baseline: float, name: str
+    bag: BagFrames,
+    found: _Found,
+    left: CameraInfo | None,
+    right: CameraInfo | None,
+    baseline: float,
+    name: str,
 ) -> None:
     """Make the calibration of the rectified pair; none where the left camera's P is not known."""
+    bag.notes += [
+        f"{name}: {camera} changes at @{stamp}: only what it says before is used, for all frames"
+        for camera, stamp in found.changes.items()
+        if any(found.cameras[camera] is each for each in (left, right))
+    ]
     if left is None or not left.usable:
         return
     p, doffs = left.p, 0.0
