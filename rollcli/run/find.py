@@ -244,7 +244,9 @@ def check_depth(frames: Sequence[Frame], options: FramesOptions) -> None:
 
 
 def _files(folder: str) -> list[str]:
-    return [each.location for each in find_inputs([folder], Search(("",), recursive=True))]
+    """List the files of a folder of calibrations; maps and views may lie beside them."""
+    found = (each.location for each in find_inputs([folder], Search(("",), recursive=True)))
+    return [path for path in found if not path.lower().endswith((*MAP_ENDINGS, *IMAGE_ENDINGS))]
 
 
 def _read(

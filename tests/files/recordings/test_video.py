@@ -204,12 +204,11 @@ def test_a_pair_of_videos_of_which_one_is_cut_off_uses_what_both_have(tmp_path, 
     assert (done.status, found[:-1]) == (3, whole[: len(found) - 1])
     assert len(found) >= 3
     assert (found[-1]["file"], "is cut off" in found[-1]["message"]) == ("b.avi#rest", True)
-    for name in ("masks", "calib"):  # of each whole frame
-        (tmp_path / name).mkdir()
+    (tmp_path / "each").mkdir()  # the mask and the calibration of each whole frame
     for number in range(len(found) - 1):
-        cv2.imwrite(str(tmp_path / "masks" / f"a_{number:06d}.png"), np.ones((120, 160), np.uint8))
-        (tmp_path / "calib" / f"a_{number:06d}").write_text("cam0=[175 0 80; 0 175 60; 0 0 1]\nbaseline=500")
-    for given in ("--mask=masks", "--calib=calib"):
+        cv2.imwrite(str(tmp_path / "each" / f"a_{number:06d}.png"), np.ones((120, 160), np.uint8))
+        (tmp_path / "each" / f"a_{number:06d}").write_text("cam0=[175 0 80; 0 175 60; 0 0 1]\nbaseline=500")
+    for given in ("--mask=each", "--calib=each"):
         again = rollcli("estimate", "--left", "a.avi", "--right", "b.avi", given, cwd=tmp_path)
         assert (again.status, len(rows(again.out)), rows(again.out)[-1]) == (3, len(found), found[-1])
 
