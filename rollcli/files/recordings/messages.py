@@ -169,10 +169,14 @@ def content_of(topic: Topic, data: memoryview, raw_of: CameraInfo | None = None)
             head, packed = packed[:12], packed[max(packed.find(png.SIGNATURE), 0) :]
             if _is_quantized(found):
                 return _unquantized(head, packed)
-        if raw_of is None:
+        mosaic = _mosaic_of(str(found.format))
+        if raw_of is None and mosaic is None:
             return packed
         decode = png.picture if packed.startswith(png.SIGNATURE) else pictures.decode_picture
-        return _rectified(decode(packed), raw_of)
+        values = decode(packed)
+        if mosaic is not None and values.ndim == 2:
+            values = cv2.cvtColor(values, mosaic)
+        return values if raw_of is None else _rectified(values, raw_of)
     if topic.type == DISPARITY:
         values = _pixels(found.image)
         below = values < float(found.min_disparity)
@@ -182,6 +186,14 @@ def content_of(topic: Topic, data: memoryview, raw_of: CameraInfo | None = None)
         return values
     values = _pixels(found)
     return values if raw_of is None else _rectified(values, raw_of)
+
+
+def _mosaic_of(form: str) -> int | None:
+    """Return OpenCV's code of a CompressedImage that is packed as the mosaic [compressed_image_transport].
+
+    Older versions made it grey before: "bayer_rggb8; jpeg compressed mono8".
+    """
+    return _BAYER.get(form[6:10]) if form.startswith("bayer_") and "mono" not in form else None
 
 
 def ending_of(topic: Topic, data: memoryview) -> str:

@@ -240,6 +240,11 @@ def test_python_iterates_the_views_of_a_bag(tmp_path):
         yield "/rgb", START, image(store, colours[..., ::-1], "rgb8", START, padding=3)
         jpeg = cv2.imencode(".jpg", colours, [cv2.IMWRITE_JPEG_QUALITY, 100])[1].tobytes()
         yield "/jpeg/compressed", START, compressed(store, jpeg, "bgr8; jpeg", START)
+        mosaic = np.tile(np.array([[200, 90], [90, 30]], np.uint8), (12, 16))
+        png = cv2.imencode(".png", mosaic)[1].tobytes()
+        for target in ("", "mono8"):  # to which that of older versions was turned before
+            form = f"bayer_rggb8; png compressed {target}"
+            yield f"/bayer{target}", START, compressed(store, png, form, START)
         yield "/32FC1", START, image(store, np.ones((24, 32), np.float32), "32FC1", START)
         yield "/late", START, image(store, colours[..., 0], "mono8", START + 9_000_000)
         # P may refer to a third camera, or to the right one
@@ -249,11 +254,13 @@ def test_python_iterates_the_views_of_a_bag(tmp_path):
             yield f"/{side}/rect", START, image(store, colours[..., 0], "mono8", START)
 
     path = write_bag(tmp_path, "drive", "mcap", make)
-    for topic in ("/rgb", "/jpeg/compressed"):
+    for topic in ("/rgb", "/jpeg/compressed", "/bayer"):
         (frame,) = package.open_recording(path, left_topic=topic, right_topic="/grey")
         np.testing.assert_array_equal(frame.right, colours[..., 0])
         assert (frame.stamp, frame.disparity) == (START, None)
         assert np.abs(frame.left.astype(int) - colours).max() <= (2 if "jpeg" in topic else 0)
+    (frame,) = package.open_recording(path, left_topic="/bayermono8", right_topic="/grey")
+    assert frame.left.shape == (24, 32)
     for right, times_focal in (("/b/rect", 22.4 + 168 - 16 * 0.001), ("/c/rect", 22.4 - 16 * 0.005)):
         (frame,) = package.open_recording(path, left_topic="/a/rect", right_topic=right)
         assert frame.calibration.baseline == pytest.approx(times_focal / 350)
