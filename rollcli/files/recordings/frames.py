@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import re
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,7 +21,7 @@ from rollcli.files.recordings.bags import Topic, opened
 from rollcli.files.recordings.messages import CAMERA_INFO, COMPRESSED, DISPARITY, IMAGE, CameraInfo
 from rollcli.rig.calibration import Calibration
 
-_RAW = "image_raw"
+_RAW = re.compile("image_(raw|mono|color)")  # what image_proc rectifies [http://wiki.ros.org/image_proc]
 _NO_P = "no CameraInfo with a principal point (P) in the image: no pitch and no height without --calib"
 _NO_LEFT = "no CameraInfo of the left view, but with a negative Tx: no pitch and no height without --calib"
 
@@ -161,7 +162,7 @@ def _add_pairs(
 ) -> None:
     """Pair the views of two topics by their header stamps, each with the nearest one within a tolerance."""
     for topic in (left, right):
-        info, is_raw = found.cameras.get(_beside(topic)), _RAW in topic
+        info, is_raw = found.cameras.get(_beside(topic)), _RAW.search(topic)
         if is_raw and info is not None and info.changes_raw_views:
             bag.notes.append(f"{topic}: raw views are rectified by D, K, R and P of {_beside(topic)}")
             found.frames[topic] = [_rectified(found, topic, each) for each in found.frames[topic]]
@@ -259,7 +260,7 @@ def _index(path: str, size: int, modified_ns: int, process: int, topic: str) -> 
     topics = _topics([path])
     found = _scan([path], [topics[topic]], topics)
     frames, info = found.frames[topic], found.cameras.get(_beside(topic))
-    if _RAW in topic and info is not None and info.changes_raw_views:
+    if _RAW.search(topic) and info is not None and info.changes_raw_views:
         frames = [_rectified(found, topic, each) for each in frames]
     return {each.name.rpartition("@")[2]: split_position(each.location)[1] for each in frames}
 

@@ -125,8 +125,8 @@ def test_views_are_paired_by_their_stamps_never_by_order(tmp_path, kind):
     assert "within 0.01 ms" in far.refused()
 
 
-@pytest.mark.parametrize("transport", ["", "/compressed"])
-def test_raw_views_are_rectified_and_a_line_says_so(tmp_path, transport):
+@pytest.mark.parametrize("view", ["image_raw", "image_raw/compressed", "image_mono", "image_color"])
+def test_raw_views_are_rectified_and_a_line_says_so(tmp_path, view):
     pair = write_pair(tmp_path / "pairs", "0.png", road_map(math.radians(3)))
     height, width = pair[0].shape
     k = np.array([[350.0, 0, 80], [0, 350, 60], [0, 0, 1]])
@@ -145,11 +145,11 @@ def test_raw_views_are_rectified_and_a_line_says_so(tmp_path, transport):
             for stamp, each in ((START, d), (START + 1, d), (START + 2, 2 * d)):  # calibrated anew
                 info = camera_info(store, stamp, (width, height), p, each, k.ravel())
                 yield f"/{side}/camera_info", stamp, info
-            if transport:
+            if "compressed" in view:
                 png = cv2.imencode(".png", raw[side])[1].tobytes()
-                yield f"/{side}/image_raw/compressed", START, compressed(store, png, "mono8; png", START)
+                yield f"/{side}/{view}", START, compressed(store, png, "mono8; png", START)
             else:
-                yield f"/{side}/image_raw", START, image(store, raw[side], "mono8", START)
+                yield f"/{side}/{view}", START, image(store, raw[side], "mono8", START)
 
     path = write_bag(tmp_path, "drive", "mcap", make).name
     for side, each in raw.items():
@@ -160,7 +160,7 @@ def test_raw_views_are_rectified_and_a_line_says_so(tmp_path, transport):
         assert np.abs(upright.astype(int) - rounded).mean() < 0.5  # levels of 256
         cv2.imwrite(str(tmp_path / "pairs" / side / "0.png"), upright)
     files = rows(rollcli("estimate", "--left", "pairs/left", "--right", "pairs/right", cwd=tmp_path).out)
-    given = [f"--{side}-topic=/{side}/image_raw{transport}" for side in ("left", "right")]
+    given = [f"--{side}-topic=/{side}/{view}" for side in ("left", "right")]
     done = rollcli("estimate", path, *given, cwd=tmp_path)
     assert "raw views are rectified by D, K, R and P of /left/camera_info" in done.err
     assert f"/left/camera_info changes at @{START + 2}: only what it says before is used" in done.err
