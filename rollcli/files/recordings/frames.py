@@ -131,7 +131,8 @@ def frames_of_bag(
     else:
         _add_maps(bag, found, topics[chosen[0]], name)
     if not bag.frames and not found.broken:
-        raise UsageError(f"{name}: has no messages of {' and '.join(chosen)}")
+        empty = (each for each in chosen if not found.frames[each])
+        raise UsageError(f"{name}: has no messages of {' and '.join(empty)}")
     bag.frames += [(rest, rest if views else None) for rest in found.broken]
     return bag
 
@@ -177,7 +178,7 @@ def _add_pairs(
     pairs = nearest([each.stamp for each in lefts], [each.stamp for each in rights], tolerance_ns)
     bag.frames = [(lefts[one], rights[other]) for one, other in pairs.items()]
     within = f"within {tolerance_ns / 1e6:g} ms"
-    if not pairs and (lefts or rights):
+    if not pairs and lefts and rights:
         raise UsageError(f"{name}: no views of {left} and {right} are {within}: --sync-tolerance")
     for side, views, paired in (("left", lefts, {*pairs}), ("right", rights, {*pairs.values()})):
         if alone := [f"@{each.stamp}" for at, each in enumerate(views) if at not in paired]:

@@ -75,7 +75,10 @@ def compressed(store, data, form, stamp, number=0):
 
 
 def write_bag(folder, name, kind, make, compression=None):
-    """Write a bag; `make(store)` yields (topic, log time in ns, message). Returns the path to name."""
+    """Write a bag; `make(store)` yields (topic, log time in ns, message). Returns the path to name.
+
+    Of a topic without messages it yields the type, and no time.
+    """
     store = ROS1 if kind == "bag" else ROS2
     if kind == "bag":
         path = folder / f"{name}.bag"
@@ -92,6 +95,8 @@ def write_bag(folder, name, kind, make, compression=None):
             kind_of = message.__msgtype__
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind_of, typestore=store)
+            if time is None:
+                continue
             serialize = store.serialize_ros1 if store is ROS1 else store.serialize_cdr
             writer.write(connections[topic], time, serialize(message, kind_of))
     if kind in ("db3", "mcap"):

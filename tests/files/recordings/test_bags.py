@@ -104,6 +104,7 @@ def test_views_are_paired_by_their_stamps_never_by_order(tmp_path, kind):
             if number != 1:  # dropped
                 late = stamp + 15_000  # as OAK's cameras
                 yield "/r/image_rect", late, image(store, right, "mono8", late, number)
+        yield "/none", None, store.types["sensor_msgs/msg/Image"]
 
     path = write_bag(tmp_path, "drive", kind, make).name
     (tmp_path / "pairs/left/1.png").unlink()
@@ -123,6 +124,8 @@ def test_views_are_paired_by_their_stamps_never_by_order(tmp_path, kind):
     assert f"1 left views have no partner within 1 ms and are left out: @{START + STEP}" in done.err
     far = rollcli("estimate", path, *given, "--sync-tolerance", "0.01", cwd=tmp_path)
     assert "within 0.01 ms" in far.refused()
+    none = rollcli("estimate", path, *given[:3], "/none", cwd=tmp_path)
+    assert "has no messages of /none\n" in none.refused()
 
 
 @pytest.mark.parametrize("view", ["image_raw", "image_raw/compressed", "image_mono", "image_color"])
