@@ -3,6 +3,7 @@
 import contextlib
 import os
 import re
+import sys
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -175,11 +176,15 @@ def _add_pairs(
         elif is_raw and not (info is not None and info.usable):
             bag.notes.append(f"{topic}: raw views are taken as they are: no CameraInfo with P rectifies them")
     lefts, rights = found.frames[left], found.frames[right]
-    pairs = nearest([each.stamp for each in lefts], [each.stamp for each in rights], tolerance_ns)
+    stamps = [each.stamp for each in lefts], [each.stamp for each in rights]
+    pairs = nearest(*stamps, tolerance_ns)
     bag.frames = [(lefts[one], rights[other]) for one, other in pairs.items()]
     within = f"within {tolerance_ns / 1e6:g} ms"
     if not pairs and lefts and rights:
-        raise UsageError(f"{name}: no views of {left} and {right} are {within}: --sync-tolerance")
+        some = nearest(*stamps, sys.maxsize).items()
+        apart = min(abs(stamps[0][one] - stamps[1][other]) for one, other in some) / 1e6
+        far = f"no views of {left} and {right} are {within}, the nearest are {apart:g} ms apart"
+        raise UsageError(f"{name}: {far}: --sync-tolerance")
     for side, views, paired in (("left", lefts, {*pairs}), ("right", rights, {*pairs.values()})):
         if alone := [f"@{each.stamp}" for at, each in enumerate(views) if at not in paired]:
             without = f"{len(alone)} {side} views have no partner {within}"

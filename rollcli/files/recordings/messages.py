@@ -32,6 +32,10 @@ _BAYER = {
     "gbrg": cv2.COLOR_BayerGR2BGR,
     "grbg": cv2.COLOR_BayerGB2BGR,
 }
+_YUV = {  # two pixels in four bytes
+    **dict.fromkeys(("yuv422", "uyvy"), cv2.COLOR_YUV2BGR_UYVY),
+    **dict.fromkeys(("yuv422_yuy2", "yuyv"), cv2.COLOR_YUV2BGR_YUY2),
+}
 # numpy's dtype, and the channels
 _PIXELS = {
     **dict.fromkeys(("mono8", "8UC1"), ("u1", 1)),
@@ -43,6 +47,7 @@ _PIXELS = {
     **dict.fromkeys(("rgba8", "bgra8", "8UC4"), ("u1", 4)),
     **dict.fromkeys(("rgb16", "bgr16"), ("u2", 3)),
     **{f"bayer_{order}{8 * size}": (f"u{size}", 1) for order in _BAYER for size in (1, 2)},
+    **dict.fromkeys(_YUV, ("u1", 2)),
 }
 _FISHEYE = ("equidistant", "fisheye")
 _ALIKE_PX = 1e-3  # K and P: far below what any calibration is worth
@@ -262,6 +267,10 @@ def _pixels(image: Any) -> NDArray[Any]:
     require_decoded_fits(width, height, channels * dtype.itemsize, data.size)
     values: NDArray[Any] = np.ndarray((height, width * channels), dtype, data, strides=(step, dtype.itemsize))
     values = native(values)
+    if encoding in _YUV:
+        if width % 2:
+            raise InputError(f"is {width} px wide; pixels of {encoding} come in twos")
+        return cv2.cvtColor(values.reshape(height, width, 2), _YUV[encoding])
     if channels > 1:
         values = values.reshape(height, width, channels)[..., :3]
         return np.ascontiguousarray(values[..., ::-1] if encoding.startswith("rgb") else values)

@@ -241,6 +241,11 @@ def test_python_iterates_the_views_of_a_bag(tmp_path):
     def make(store):
         yield "/grey", START, image(store, colours[..., 0], "mono8", START)
         yield "/rgb", START, image(store, colours[..., ::-1], "rgb8", START, padding=3)
+        y, u, v = 116, 85, 181  # the same colour [ITU-R BT.601]
+        for name, two in (("yuv422", [[u, y], [v, y]]), ("yuv422_yuy2", [[y, u], [y, v]])):
+            packed = np.tile(np.array(two, np.uint8), (24, 16, 1))
+            yield f"/{name}", START, image(store, packed, name, START, padding=3)
+            yield f"/odd/{name}", START, image(store, packed[:, 1:], name, START)
         jpeg = cv2.imencode(".jpg", colours, [cv2.IMWRITE_JPEG_QUALITY, 100])[1].tobytes()
         yield "/jpeg/compressed", START, compressed(store, jpeg, "bgr8; jpeg", START)
         mosaic = np.tile(np.array([[200, 90], [90, 30]], np.uint8), (12, 16))
@@ -257,11 +262,12 @@ def test_python_iterates_the_views_of_a_bag(tmp_path):
             yield f"/{side}/rect", START, image(store, colours[..., 0], "mono8", START)
 
     path = write_bag(tmp_path, "drive", "mcap", make)
-    for topic in ("/rgb", "/jpeg/compressed", "/bayer"):
+    for topic in ("/rgb", "/jpeg/compressed", "/bayer", "/yuv422", "/yuv422_yuy2"):
         (frame,) = package.open_recording(path, left_topic=topic, right_topic="/grey")
         np.testing.assert_array_equal(frame.right, colours[..., 0])
         assert (frame.stamp, frame.disparity) == (START, None)
-        assert np.abs(frame.left.astype(int) - colours).max() <= (2 if "jpeg" in topic else 0)
+        most = 0 if topic in ("/rgb", "/bayer") else 2
+        assert np.abs(frame.left.astype(int) - colours).max() <= most
     (frame,) = package.open_recording(path, left_topic="/bayermono8", right_topic="/grey")
     assert frame.left.shape == (24, 32)
     for right, times_focal in (("/b/rect", 22.4 + 168 - 16 * 0.001), ("/c/rect", 22.4 - 16 * 0.005)):
@@ -271,6 +277,8 @@ def test_python_iterates_the_views_of_a_bag(tmp_path):
     assert frame.calibration.baseline is None
     late = {"left_topic": "/rgb", "right_topic": "/late"}
     assert len(list(package.open_recording(path, **late, sync_tolerance=0.01))) == 1
+    with pytest.raises(InputError, match="is 31 px wide; pixels of yuv422 come in twos"):
+        list(package.open_recording(path, left_topic="/odd/yuv422", right_topic="/grey"))
     with pytest.raises(InputError, match=r"/32FC1@\d+: holds float32; a camera image is uint8 or uint16"):
         list(package.open_recording(path, left_topic="/32FC1", right_topic="/grey"))
     for said, given in (
