@@ -249,7 +249,8 @@ class Fit:
     beta : ndarray of float, shape (P, G, M)
     covariance : ndarray of float, shape (P, G, M, M)
     log_evidence : ndarray of float, shape (P, G)
-        Of the noise and the design; coefficients beyond the first have the prior of one unit.
+        Of the noise and the design; coefficients beyond the first have the prior of one unit, or of the
+        cells' spread where that is more.
     """
 
     beta: Floats
@@ -324,13 +325,16 @@ class Likelihood:
         values, vectors = np.linalg.eigh(correlations * root[:, None] * root)
         self._rotate = np.swapaxes(vectors, 1, 2) * root  # (P, C, C): Q' D^-1/2
         low, high = TUNING.spreads
-        largest = max(high * unit, _ROOM * float(np.std(cells.values)))
+        spread = float(np.std(cells.values))
+        largest = max(high * unit, _ROOM * spread)
         squares = np.geomspace(low * unit, largest, TUNING.spread_steps)[:, None] ** 2
         slow, own = (each.ravel()[:, None] for each in np.broadcast_arrays(squares, TUNING.error_factors))
         self._weights = 1 / (slow * np.maximum(values, 0)[:, None, :] + own)  # (P, G, C)
         priors = TUNING.spread_power / 2 * np.log(squares) + np.log(TUNING.error_priors)
         self._base = np.log(_priors())[:, None] + priors.ravel() + np.log(self._weights).sum(-1) / 2
         self.cells, self.unit = cells, unit
+        # wider noise leaves a step or a line open by more than a unit, which would speak for it
+        self._prior = math.log(max(unit, spread))
         self._values = self.rotated(cells.values[:, None])
 
     def rotated(self, columns: Floats) -> Floats:
@@ -349,7 +353,7 @@ class Likelihood:
         beta = (covariance @ pull[..., None])[..., 0]
         left = self._products(self._values**2)[..., 0] - (beta * pull).sum(-1)
         determinant = np.linalg.slogdet(normal)[1]
-        priors = (design.shape[1] - 1) * math.log(self.unit)
+        priors = (design.shape[1] - 1) * self._prior
         return Fit(beta, covariance, self._base - left / 2 - determinant / 2 - priors)
 
     def scan(self, design: Floats, fit: Fit) -> Floats:
@@ -364,7 +368,7 @@ class Likelihood:
         own -= ((crossed @ fit.covariance) * crossed).sum(-1)
         known = own > 1e-9 * self._own_of_steps.max(axis=-1, keepdims=True)
         safe = np.where(known, own, 1.0)
-        gain = np.where(known, left**2 / safe / 2 - np.log(safe) / 2 - math.log(self.unit), -np.inf)
+        gain = np.where(known, left**2 / safe / 2 - np.log(safe) / 2 - self._prior, -np.inf)
         return np.asarray(np.logaddexp.reduce(fit.log_evidence[..., None] + gain, axis=(0, 1)))
 
     def pairs(self, design: Floats, fit: Fit) -> Floats:

@@ -66,6 +66,12 @@ def test_a_drift_is_found_and_is_no_jump(seed):
 
 
 @pytest.mark.slow
+def test_frames_that_differ_by_degrees_seldom_have_a_drift_that_is_none():
+    found = [assess_sequence(*drive(seed, 24, phi=0.0, sd=6.0)) for seed in range(20)]
+    assert sum(each.status != "stable" for each in found) <= 3  # 8 where the prior of a drift is one degree
+
+
+@pytest.mark.slow
 def test_gross_outliers_called_ok_hardly_move_the_mean():
     of = [[assess_sequence(*drive(seed, gross=share)).now.value for seed in range(6)] for share in (0, 0.05)]
     clean, soiled = np.array(of) + 0.44
