@@ -239,7 +239,8 @@ def test_a_derotated_map_of_depths_is_shown_in_pixels_or_not_at_all(tmp_path):
 def test_results_of_several_runs_are_drives_and_shards_are_one(tmp_path):
     for name, roll in (("a", 1.0), ("b", -2.0)):
         turns = np.random.default_rng(5).normal(roll, 0.05, 40)
-        write_result(tmp_path / f"{name}.csv", [row(f"m/{at:03}.png", turn) for at, turn in enumerate(turns)])
+        rows = [row(f"m/{at:03}.png", turn, 0.0002) for at, turn in enumerate(turns)]
+        write_result(tmp_path / f"{name}.csv", rows)
         (tmp_path / f"{name}.csv.run.json").write_text(f'{{"rollcli": "{name}", "options": {{}}}}')
 
     assert rollcli("report", "a.csv", "b.csv", "-o", "page.html", "--gallery", "0", cwd=tmp_path).status == 0
@@ -248,6 +249,7 @@ def test_results_of_several_runs_are_drives_and_shards_are_one(tmp_path):
     assert re.search(r"<h1>Roll of 80 frames</h1>.*<code>a\.csv, b\.csv</code>.*>rollcli a, b<", page, re.S)
     assert re.search(r'class="value">roll −[12]\.\d+ ± [\d.]+° <span>in m \(b\.csv\)</span>', page)
     assert "m (b.csv) differs from m (a.csv) by -" in page
+    assert "<dt>interval of a frame</dt><dd>± 0.001°</dd>" in page  # and not of nothing
 
     for name, index in (("a", 1), ("b", 2)):
         (tmp_path / f"{name}.csv.run.json").write_text(json.dumps({"options": {"shard": f"{index}/2"}}))
