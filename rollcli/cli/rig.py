@@ -13,8 +13,8 @@ from rollcli.run.options import GateOptions, RigOptions
 gate_options = Section(
     "gates", "Checks: exit status 4 when one fails, 5 when none fails and one cannot be told", GateOptions
 ).of(
-    option("--expect-roll", Number("DEG")),
-    option("--expect-pitch", Number("DEG")),
+    option("--expect-roll", Number("DEG", at_least=-90, at_most=90)),
+    option("--expect-pitch", Number("DEG", at_least=-90, at_most=90)),
     option("--expect-height", Number("M")),
     option("--within", Number("DEG", at_least=0)),
     option("--within-height", Number("M", at_least=0)),

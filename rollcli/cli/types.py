@@ -68,6 +68,8 @@ class FilePath(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if value == "":
             self.fail("the name is empty: is a variable unset?", param, ctx)
+        if value == "-" and self is DIR:
+            self.fail("'-' is stdin or stdout, and no folder; one of this name is './-'", param, ctx)
         ending = PurePath(str(value)).suffix.lower()
         if self.endings and ending in _OTHER_FORMATS.difference(self.endings):
             self.fail(f"{value!r}: {ending} is not written here; write {self.what}", param, ctx)

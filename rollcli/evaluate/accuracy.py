@@ -292,7 +292,8 @@ def _lines(name: str, part: Accuracy, unit: str) -> Iterator[tuple[str, str]]:
         yield f"{name}frames compared", str(part.count)
     for figure, words in _LENGTHS.items():
         value, more = getattr(part, figure), "" if name or figure != "worst" else f"  {part.worst_file}"
-        yield f"{name}{words}", "-" if value is None else f"{value:.4f} {unit}{more}"
+        # no zero has a sign
+        yield f"{name}{words}", "-" if value is None else f"{round(value, 4) + 0.0:.4f} {unit}{more}"
 
 
 def _percent(share: float | None, of: int) -> str:

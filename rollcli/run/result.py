@@ -22,6 +22,7 @@ from rollcli.files.atomic import is_file, is_folder, is_there, remove_leftovers,
 from rollcli.files.locking import exists_already, locked_folder, not_resumable
 from rollcli.files.storage import is_stream, list_names, open_stream, read_bytes, remove, write_bytes
 from rollcli.files.stores.locations import base_name, is_url, public_name
+from rollcli.messages import counted
 from rollcli.run import outputs
 from rollcli.run.batch import Batch, BatchOptions, Step
 from rollcli.run.frame import Frame
@@ -81,7 +82,8 @@ class Output:
 
     def hint(self) -> str:
         """Say that --resume continues, if rows are kept; a stream keeps none."""
-        return f"; {self._rows_there} rows are kept, continue with --resume" if self._rows_there else ""
+        there = self._rows_there
+        return f"; {counted(there, 'row')} kept, continue with --resume" if there else ""
 
     def restore(self, frames: Sequence[Frame], batch: Batch) -> None:
         """Take the images of incomplete frames, which were made again.

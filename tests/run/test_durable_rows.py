@@ -69,7 +69,7 @@ def test_a_row_is_written_after_its_images_and_their_folder_are_on_the_disk(tmp_
     for frame, forced in zip(plan.frames, file.rows.values(), strict=True):
         assert {(tmp_path / frame.file).stat().st_ino, tmp_path.stat().st_ino} <= forced
     assert file.synced == 40
-    assert output.hint() == "; 40 rows are kept, continue with --resume"
+    assert output.hint() == "; 40 rows kept, continue with --resume"
 
 
 @pytest.fixture

@@ -49,7 +49,7 @@ def test_a_full_disk_keeps_the_other_parts_and_says_how_to_go_on(parts, gone, ke
         done = rollcli(*line, "--resume", "-j", "1", cwd=folder, status=1)
     assert done.err.endswith(
         f"rollcli: rolls.parquet/part-0000{gone[0]}.parquet: cannot be written: no space left on device; "
-        f"{kept} rows are kept, continue with --resume\n"
+        f"{kept} rows kept, continue with --resume\n"
     )
     assert rollcli(*line, "--resume", cwd=folder).status == 0
     assert contents(folder) == whole

@@ -20,6 +20,7 @@ from rollcli.files.naming import Input, listed, split_position
 from rollcli.files.recordings import messages
 from rollcli.files.recordings.bags import Topic, opened
 from rollcli.files.recordings.messages import CAMERA_INFO, COMPRESSED, DISPARITY, IMAGE, CameraInfo
+from rollcli.messages import counted
 from rollcli.rig.calibration import Calibration
 
 _RAW = re.compile("image_(raw|mono|color)")  # what image_proc rectifies [http://wiki.ros.org/image_proc]
@@ -187,8 +188,8 @@ def _add_pairs(
         raise UsageError(f"{name}: {far}: --sync-tolerance")
     for side, views, paired in (("left", lefts, {*pairs}), ("right", rights, {*pairs.values()})):
         if alone := [f"@{each.stamp}" for at, each in enumerate(views) if at not in paired]:
-            without = f"{len(alone)} {side} views have no partner {within}"
-            bag.notes.append(f"{name}: {without} and are left out: {listed(alone)}")
+            without = f"{counted(len(alone), f'{side} view')} without a partner {within}"
+            bag.notes.append(f"{name}: {without}, left out: {listed(alone)}")
     one, other = (found.cameras.get(_beside(each)) for each in (left, right))
     _calibrate(bag, found, one, other, 0.0, name)
     if bag.calibration is None and found.cameras:

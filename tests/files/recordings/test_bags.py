@@ -121,7 +121,7 @@ def test_views_are_paired_by_their_stamps_never_by_order(tmp_path, kind):
     ]
     for one, other in zip(files, found, strict=True):
         assert float(one["roll_deg"]) == pytest.approx(float(other["roll_deg"]), abs=0.005)
-    assert f"1 left views have no partner within 1 ms and are left out: @{START + STEP}" in done.err
+    assert f"1 left view without a partner within 1 ms, left out: @{START + STEP}" in done.err
     far = rollcli("estimate", path, *given, "--sync-tolerance", "0.01", cwd=tmp_path)
     assert "within 0.01 ms" in far.refused()
     none = rollcli("estimate", path, *given[:3], "/none", cwd=tmp_path)

@@ -193,7 +193,7 @@ def test_a_scheduler_that_is_lost_ends_the_run_which_goes_on_without_it(local, f
     *broken, said = err.splitlines()  # the scheduler may be lost before this frame is told
     assert broken in ([], ["rollcli: maps/frame5.png: is empty"])
     assert said.startswith(f"rollcli: {cluster_here.address}: the connection to the scheduler is lost; ")
-    assert said.endswith(" rows are kept, continue with --resume")
+    assert said.endswith(" rows kept, continue with --resume")
     assert rollcli("estimate", "maps", "-q", "-o", "rolls.csv", *IMAGES, "--resume", cwd=far).status == 3
     assert_is_that_of_a_local_run(far, local)
 
