@@ -14,6 +14,7 @@ from rollcli.files.storage import read_bytes
 from tests.run_cli import command, contents, ended, road_map, rollcli, rows_of, write_kitti, write_maps
 
 
+@pytest.mark.slow
 def test_workers_that_were_forked_from_one_process_read_an_archive_each_for_itself(tmp_path):
     for number in range(24):
         write_kitti(tmp_path / "all" / f"{number}.png", road_map(width=640, height=480, seed=number))

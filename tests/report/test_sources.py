@@ -24,6 +24,7 @@ def report(folder, result, server, *arguments):
     return rollcli("report", result, "-o", "page.html", *arguments, cwd=folder, **keys)
 
 
+@pytest.mark.slow
 def test_remote_images_of_a_local_result_are_asked_for_with_fetch_alone(tmp_path, server):
     url = f"{server.address}/frame0.png"
     names = (url, url.replace("http", "HTTP"), "s3://private/frame0.png", "az://private/frame0.png")

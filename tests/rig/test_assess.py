@@ -63,6 +63,7 @@ def test_rigs_that_differ_are_not_pooled_however_few_their_frames(frames):
     assert re.search(r"the drives differ: \+2\.\S+( ± \S+)? in a, -[23]\.\S+( ± \S+)? in b", line)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frames", [3, 7])
 def test_short_drives_of_one_rig_do_not_differ_by_the_sway_of_its_car(frames):
     differing = 0

@@ -112,6 +112,7 @@ def test_where_the_right_camera_is_rolled_or_longer_the_interval_holds_the_pitch
     assert np.median(off) < 0.02
 
 
+@pytest.mark.slow
 def test_a_map_of_a_pair_whose_right_camera_is_rolled_has_the_pitch_of_its_pair(tmp_path):
     spec = FrameSpec(scene="open", pitch=0.07, principal_point=(319.5, 200.0), seed=12, colour=False)
     write_views(tmp_path, "a.png", render_frame(spec).left, seen_rolled(spec, 0.5))

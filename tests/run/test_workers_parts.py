@@ -113,6 +113,7 @@ def test_parts_of_several_workers_are_the_file_of_one_process(maps, bucket, rows
     assert len(list_names(f"{bucket}/{rows}.csv")) == -(-23 // int(rows))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.version_info < (3, 11), reason="Python 3.10 searches the current folder")
 def test_workers_run_nothing_that_lies_in_the_current_folder(maps):
     pytest.importorskip("pyarrow", reason="pyarrow, of the extra parquet, is not here")
@@ -148,6 +149,7 @@ def test_a_resume_does_the_parts_that_are_missing_wherever_they_are_and_no_other
     assert {part: part.stat().st_ino for part in places} == places
 
 
+@pytest.mark.slow
 def test_a_hole_is_filled_before_a_failed_frame_of_a_later_part_is_done_again(maps, bucket):
     line = ("estimate", "maps", "-o", f"{bucket}/rolls.csv", "--part-rows", "3", "-q")
     assert rollcli(*line, cwd=maps).status == 3

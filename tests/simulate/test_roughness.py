@@ -85,7 +85,8 @@ def test_rays_end_where_a_fine_scan_meets_the_uneven_road(roughness, section):
         assert depth[rows[k], columns[k]] == pytest.approx(found, abs=0.005)
 
 
-@pytest.mark.parametrize("seed", mostly_slow(range(3), 0))
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
 def test_the_lane_of_a_rough_road_has_the_rolls_of_its_pixels_and_no_height(seed):
     spec = FrameSpec("bare", 0.05, 0.04, size=(800, 600), focal=464, roughness="C", seed=seed, dips=0)
     low, high = lane_rolls_of(spec)

@@ -178,13 +178,13 @@ def _of_web(ask, kinds, *given):
 
 def _of_silence():
     """What is said of a server that is silent, of one that is not there, and of no address."""
-    with mock.patch.object(web.time, "sleep"), socket.create_server(("127.0.0.1", 0)) as silent:
-        url = f"http://127.0.0.1:{silent.getsockname()[1]}"
-        with mock.patch.dict(os.environ, {objects.TIMEOUT_VARIABLE: "0.05"}):
-            said = [made(web.read_web_file, f"{url}/{SIGNED}")]
-    said += [
-        made(web.read_web_file, f"{each}/{SIGNED}") for each in (url, "http://[", "http://user:secret@[")
-    ]
+    with mock.patch.object(web.time, "sleep"):
+        with socket.create_server(("127.0.0.1", 0)) as silent:
+            url = f"http://127.0.0.1:{silent.getsockname()[1]}"
+            with mock.patch.dict(os.environ, {objects.TIMEOUT_VARIABLE: "0.05"}):
+                said = [made(web.read_web_file, f"{url}/{SIGNED}")]
+        addresses = (url, "http://[", "http://user:secret@[")
+        said += [made(web.read_web_file, f"{each}/{SIGNED}") for each in addresses]
     return [each.replace(url, "ADDRESS") for each in said]
 
 
