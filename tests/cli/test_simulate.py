@@ -37,6 +37,7 @@ def drive(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_the_rig_is_as_it_was_rendered(drive):
     values = json.loads(rollcli("rig", "rolls.csv", "--format", "json", "-q", cwd=drive).out)
     assert values["frames"] == 24

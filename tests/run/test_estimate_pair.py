@@ -58,6 +58,7 @@ def test_a_pair_and_its_map_give_the_same_row(pair, form):
         assert float(of_map[column]) == pytest.approx(float(of_pair[column]), abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_yaw_is_about_the_principal_point_in_a_pair_and_in_its_map(tmp_path):
     """Views without their right fifth: a yaw about the middle would turn the road by 0.1 degrees."""
     spec = FrameSpec(scene="open", roll=math.radians(3), seed=12, colour=False, size=(800, 600))
