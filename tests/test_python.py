@@ -136,7 +136,7 @@ def test_each_setting_of_the_estimator_has_its_default_and_reaches_it(monkeypatc
     for call, *views in ((rollcli.estimate_roll, view), (rollcli.estimate_pair, view, np.roll(view, -10, 1))):
         named = inspect.signature(call).parameters
         given = {name: value for name, value in asked.items() if name in named}
-        assert asked.keys() - named.keys() - {"tuning", "middle", "doffs"} == (
+        assert asked.keys() - named.keys() - {"tuning", "middle", "doffs", "aspect"} == (
             {"slope_error"} if len(views) == 2 else set()
         )
         assert named.keys() - asked.keys() <= own

@@ -11,6 +11,7 @@ import numpy as np
 from rollcli.estimator.interval import Interval
 from rollcli.estimator.moments import CheckedMap
 from rollcli.estimator.request import Request
+from rollcli.estimator.road.model import rig_turns
 from rollcli.estimator.road.pixels import PixelSet
 from rollcli.estimator.road.sample import quantile
 from rollcli.estimator.road.surface import Surface
@@ -67,14 +68,15 @@ def doubts_of(
         yield "another plane, with another roll, explains the map nearly as well"
     if surface and surface.moved > tuning.longest_move:
         yield f"the road's pixels moved the roll by {math.degrees(surface.moved):.1f} degrees"
-    if road and surface and abs(surface.model.theta) > _AT_BOUND * request.max_roll:
+    if road and surface and abs(surface.model.theta) > _AT_BOUND * math.atan(request.max_tangent):
         yield "the roll is at its bound, --max-roll"
     if interval is None:
         yield "too few pixels lie away from the map's border to tell how sure the angle is"
-    if interval and interval.noise > tuning.noise_share * request.max_interval:
-        yield f"noise and misfit leave the angle open: ±{math.degrees(interval.noise):.2f} degrees"
-    if interval and interval.half_width > request.max_interval:
-        yield f"the interval is wide: ±{math.degrees(interval.half_width):.2f} degrees"
+    turns = rig_turns(solution.theta, request.aspect)
+    if interval and turns * interval.noise > tuning.noise_share * request.max_interval:
+        yield f"noise and misfit leave the angle open: ±{math.degrees(turns * interval.noise):.2f} degrees"
+    if interval and turns * interval.half_width > request.max_interval:
+        yield f"the interval is wide: ±{math.degrees(turns * interval.half_width):.2f} degrees"
 
 
 def _doubts_of_plane(
@@ -104,16 +106,18 @@ def _doubts_of_plane(
     step = -(-width // _COLUMNS)
     model, grid = surface.model, surface.grid
     x, y = grid.normalised(np.arange(0, width, step), np.arange(0, height, step)[:, None])
-    road = model.disparity_along(model.along(x, y))
+    along = model.along(x, y)
+    road = model.disparity_along(along)
     d, valid = checked.values[::step, ::step], checked.valid[::step, ::step]
-    lane = (road > 0) & (np.abs(model.side(model.across(x, y), road)) < 1)
+    lane = (road > 0) & (np.abs(model.side(model.lateral(model.across(x, y), along), road)) < 1)
     on_road = valid & (np.abs(d - road) < _ON_ROAD * road + 3 * rmse)
     below = valid & (d < (1 - _BELOW) * road - 3 * rmse)
     # in the middle of the last row and of the first
     bottom, top = (model.along(0.0, (row - grid.centre_v) / grid.scale) for row in (height - 1, 0))
     nearest, farthest = model.disparity_along(bottom), model.disparity_along(top)
     _, slope, bend = model.alpha
-    wide = width / grid.scale * abs(slope + 2 * bend * bottom) / nearest if nearest > 0 else math.inf
+    rise = model.aspect * abs(slope + 2 * bend * bottom)
+    wide = width / grid.scale * rise / nearest if nearest > 0 else math.inf
     if wide < tuning.narrowest:
         yield f"the view is as narrow as that of a table: {wide:.1f} camera heights"
     filled = float(on_road.sum()) / max(1.0, float(valid.sum()))

@@ -193,7 +193,8 @@ def estimate_roll(
     knife = None if surface is None else jackknife(surface, theta, tuning.interval)
     alpha = pixels.energy.parabola(theta)
     height, width = checked.values.shape
-    tangent = touch(alpha, theta, Grid.of_shape(height, width, request.middle), surface, knife)
+    grid = Grid.of_shape(height, width, request.middle, request.aspect)
+    tangent = touch(alpha, theta, grid, surface, knife)
     turned = math.hypot(tangent.turned_by(request.slope_error), certified.off)
     interval = None if knife is None else interval_of(knife, theta, turned, tuning.interval)
     doubts, notes = list(doubts_of(checked, pixels, certified, interval, request)), []

@@ -142,7 +142,8 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
     columns, in_columns = _by_group(rows, across, leverage, tuning.groups)
     quarter = in_bands * (2 * tuning.groups) + in_columns
     uneven = _unevenness(heights, leverage, quarter, tuning.groups, tuning.noise_falls)
-    in_lane = _nearest_seen(plain[np.abs(model.side(across, plain)) < 1], 0.5 / tuning.groups) or nearest
+    side = model.side(model.lateral(across, along), plain)
+    in_lane = _nearest_seen(plain[np.abs(side) < 1], 0.5 / tuning.groups) or nearest
     width_at_1, border = _view(surface, model)
 
     total = bands.sum(0)
@@ -174,7 +175,8 @@ def _design(surface: Surface, model: RoadModel, across: Reals, along: Reals, pla
     rows = np.empty((6, len(along)), np.float32)
     rows[0], rows[1], rows[2] = 1, along, along * along * surface.parabolic
     model.turning(across, along, out=rows[3])
-    rows[4] = model.bulge(across, plain) if math.isfinite(surface.camber_precision) else 0
+    cambered = math.isfinite(surface.camber_precision)
+    rows[4] = model.bulge(model.lateral(across, along), plain) if cambered else 0
     rows[5] = surface.d - plain
     return rows
 
@@ -184,11 +186,11 @@ def _view(surface: Surface, model: RoadModel) -> tuple[float, float]:
 
     And the disparity, px, where the middle of the lane leaves what was looked at: a rolled view on one side.
     """
-    cosine, sine, grid = abs(math.cos(model.theta)), abs(math.sin(model.theta)), surface.grid
-    across = sum(surface.sides) * cosine + 2 * grid.centre_v / grid.scale * sine
-    side = surface.sides[model.theta < 0]
-    leaves = min(surface.lowest / max(cosine, _LEAST_SPAN), side / max(sine, _LEAST_SPAN))
-    return across * abs(model.alpha[1]), model.disparity_along(leaves)
+    cosine, sine = model.aspect * abs(math.cos(model.theta)), abs(math.sin(model.theta))
+    grid, side = surface.grid, surface.sides[model.theta < 0]
+    lateral = sum(surface.sides) * cosine + 2 * grid.centre_v / grid.scale * sine / model.aspect
+    leaves = min(surface.lowest / max(model.aspect * cosine, _LEAST_SPAN), side / max(sine, _LEAST_SPAN))
+    return lateral * abs(model.alpha[1]), model.disparity_along(leaves * (cosine**2 + sine**2))
 
 
 def _nearest_seen(lane: Reals, share: float) -> float:

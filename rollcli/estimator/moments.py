@@ -197,17 +197,22 @@ class Grid:
         The origin, pixels from the centre of the top-left pixel.
     scale : float
         Pixels per unit; half the longer side of the map.
+    aspect : float
+        See `Request`.
     """
 
     centre_u: float
     centre_v: float
     scale: float
+    aspect: float = 1.0
 
     @classmethod
-    def of_shape(cls, height: int, width: int, middle: tuple[float, float] | None = None) -> "Grid":
+    def of_shape(
+        cls, height: int, width: int, middle: tuple[float, float] | None = None, aspect: float = 1.0
+    ) -> "Grid":
         """Return the grid of a map of this shape; its origin is in the column of `middle`, if given."""
         column = (width - 1) / 2 if middle is None else middle[0]
-        return cls(column, (height - 1) / 2, max(width, height, 2) / 2)
+        return cls(column, (height - 1) / 2, max(width, height, 2) / 2, aspect)
 
     def normalised(self, u: NDArray[Any], v: NDArray[Any]) -> tuple[Floats, Floats]:
         """Return p of columns and q of rows, each an array of the shape given."""

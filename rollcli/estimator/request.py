@@ -80,6 +80,8 @@ class Request:
         middle of the map. None: that middle.
     doffs : float
         What is added to disparities so that they are 0 infinitely far away, px: that of a calibration.
+    aspect : float
+        fy / fx of a calibration; more than 0. What lies to the side of the lane is that of the rig.
     tuning : Tuning
         The estimator's tuned numbers; to study what they do.
 
@@ -100,6 +102,7 @@ class Request:
     seed: int = 0
     middle: tuple[float, float] | None = None
     doffs: float = 0.0
+    aspect: float = 1.0
     tuning: Tuning = TUNING
 
     def __post_init__(self) -> None:
@@ -130,6 +133,11 @@ class Request:
     def parabolic(self) -> bool:
         """Whether the road is a parabola, not a line."""
         return self.model == "parabola"
+
+    @property
+    def max_tangent(self) -> float:
+        """Tangent of the largest roll, in the map's pixels."""
+        return self.aspect * math.tan(self.max_roll)
 
 
 DEFAULT_REQUEST = Request()

@@ -32,7 +32,6 @@ from rollcli.estimator.road.model import FARTHEST_SIDE, Coordinate, RoadModel, c
 from rollcli.estimator.road.sample import medians_of
 from rollcli.files.results import Row
 from rollcli.rig.calibration import Calibration, require_calibration
-from rollcli.rig.pose import turns_of
 
 _BLOCK = 1 << 16  # pixels at a time: what they need stays in the processor's cache
 _FLATTEST = 0.2  # of the rise near ahead: a parabola that is flatter is no road, which then goes on straight
@@ -75,40 +74,42 @@ class FittedRoad:
     @classmethod
     def of_estimate(cls, estimate: RollEstimate) -> "FittedRoad":
         """Take the road of an estimate, with or without a pose."""
-        # of the pixels, which are not the rig's where fx and fy differ
-        knife = estimate.tangent.jackknife
+        # theta of the pixels, which is not the rig's where fx and fy differ
+        knife, grid = estimate.tangent.jackknife, estimate.tangent.grid
         camber = None if knife is None else knife.camber
-        model = RoadModel(estimate.tangent.theta, estimate.alpha, camber or 0.0)
-        return cls(model, estimate.width, estimate.height, estimate.tangent.grid.centre_u)
+        model = RoadModel(estimate.tangent.theta, estimate.alpha, camber or 0.0, grid.aspect)
+        return cls(model, estimate.width, estimate.height, grid.centre_u)
 
     @classmethod
     def of_row(cls, row: Row, calibration: Calibration | None) -> "FittedRoad | None":
         """Take the road of a row of a result; None where the row has none.
 
-        Roll and camber of a row with a pitch are the rig's: the pitch, and where fx and fy differ
-        `calibration`, turn them back into those of the pixels, the roll where the row has that of the rig
-        alone.
+        Roll and camber of a row with a pitch are the rig's: the pitch turns the camber back into that of the
+        view, and where fx and fy differ `calibration` the roll into that of the pixels, where the row has
+        that of the rig alone.
         """
         if row.map_roll_deg is None or row.width is None or row.height is None or row.alpha is None:
             return None
         theta, pitch = math.radians(row.map_roll_deg), math.radians(row.pitch_deg or 0.0)
-        ahead, nearer = None, math.cos(pitch)
+        ahead, aspect = None, 1.0
         if calibration is not None and row.pitch_deg is not None:
+            aspect = calibration.fy / calibration.fx
             if row.image_roll_deg is None:
-                theta = math.atan2(math.sin(theta) * calibration.fy / calibration.fx, math.cos(theta))
-            ahead = column_ahead(theta, (calibration.cx, calibration.cy), (row.height - 1) / 2)
-            nearer = nearer * turns_of(theta, calibration)
-        return cls(RoadModel(theta, row.alpha, (row.camber or 0.0) / nearer**2), row.width, row.height, ahead)
+                theta = math.atan2(math.sin(theta) * aspect, math.cos(theta))
+            ahead = column_ahead(theta, (calibration.cx, calibration.cy), (row.height - 1) / 2, aspect)
+        model = RoadModel(theta, row.alpha, (row.camber or 0.0) / math.cos(pitch) ** 2, aspect)
+        return cls(model, row.width, row.height, ahead)
 
     @property
     def middle(self) -> tuple[float, float]:
         """The middle column and row; the column is the one that looks straight ahead."""
         return (self.width - 1) / 2 if self.ahead is None else self.ahead, (self.height - 1) / 2
 
-    def across(self, columns: Coordinate, rows: Coordinate) -> Coordinate:
-        """Return the place across the road of pixels, px from the map's middle."""
+    def lateral(self, columns: Coordinate, rows: Coordinate) -> Coordinate:
+        """Return the place beside the lane of pixels, px from the map's middle; see `RoadModel.lateral`."""
         column, row = self.middle
-        return self.model.across(columns - column, rows - row)
+        x, y = columns - column, rows - row
+        return self.model.lateral(self.model.across(x, y), self.model.along(x, y))
 
     @property
     def middle_rise(self) -> float:
@@ -285,7 +286,7 @@ class _Profile:
         heights = self.heights(some, columns, rows, None)
         known = np.isfinite(heights)
         d = some[known].astype(np.float32)
-        side = self.road.across(columns, rows)[known] * np.float32(self.road.middle_rise) / d
+        side = self.road.lateral(columns, rows)[known] * np.float32(self.road.middle_rise) / d
         return d, side, heights[known] * d / np.float32(self.rise)
 
     def at(self, disparity: Singles) -> tuple[Singles, Singles]:
@@ -317,8 +318,8 @@ class _Profile:
             d = stored.astype(np.float32)
         known = has_disparity(d)
         d[~known] = self.disparity
-        across = road.across(columns, rows)
-        side, rest, root = _cambered(d, across, road)
+        lateral = road.lateral(columns, rows)
+        side, rest, root = _cambered(d, lateral, road)
         foot, rise = self.at(d * rest)
         rise *= root
         gap = foot + columns * np.float32(sine) - (rows * np.float32(cosine) - np.float32(self.row))
@@ -329,10 +330,9 @@ class _Profile:
         along = calibration.cy * cosine - calibration.cx * sine - self.row
         ahead = d * rest / rise - foot + np.float32(along)
         tilt = side / rise * np.float32(camber * road.middle_rise)
-        ahead += tilt * (np.float32(road.across(calibration.cx, calibration.cy)) - across)
-        skew = np.float32(2 * (aspect**2 - 1) * cosine * sine)
-        lean = (tilt * np.float32(cosine**2 + (aspect * sine) ** 2) + skew) * tilt
-        lean += np.float32(sine**2 + (aspect * cosine) ** 2)
+        ahead += tilt * (np.float32(road.lateral(calibration.cx, calibration.cy)) - lateral)
+        lean = np.square(tilt * np.float32(road.model.aspect * cosine) - np.float32(sine))
+        lean += np.square(tilt * np.float32(aspect * sine / road.model.aspect) + np.float32(aspect * cosine))
         ahead *= np.float32(1 / calibration.fx)
         length = np.sqrt(ahead * ahead + lean) * np.float32(1 / (calibration.baseline or 1.0))
         return np.where(known, gap / (length * d), np.float32(np.nan))
@@ -376,17 +376,17 @@ def _weighted_fit(design: Floats, values: Floats, weights: NDArray[Any]) -> tupl
     return fitted, np.abs(values - design @ fitted)
 
 
-def _cambered(d: Singles, across: Singles, road: FittedRoad) -> tuple[Singles, Singles, Singles]:
+def _cambered(d: Singles, lateral: Singles, road: FittedRoad) -> tuple[Singles, Singles, Singles]:
     """Take from disparities what camber adds, which is of the disparity without it [RoadModel].
 
     Returns
     -------
     tuple of ndarray
-        Places across in camera heights, of the disparity with camber, 0 beyond where camber is extrapolated;
-        the share of the disparity that is not camber's; and what makes of the rise of the road without
-        camber, by that share, its rise with it.
+        Places to the side in camera heights, of the disparity with camber, 0 beyond where camber is
+        extrapolated; the share of the disparity that is not camber's; and what makes of the rise of the road
+        without camber, by that share, its rise with it.
     """
-    side = across * np.float32(road.middle_rise) / d
+    side = lateral * np.float32(road.middle_rise) / d
     # camber is not extrapolated beyond `FARTHEST_SIDE`, which is of the disparity without it
     most = np.float32(FARTHEST_SIDE / max(1 + road.model.camber / 2 * FARTHEST_SIDE**2, _FLATTEST))
     inside = np.clip(side, -most, most)

@@ -209,7 +209,8 @@ def request_with(calibration: Calibration | None, request: Request) -> Request:
     """Return a request for a map that this is the calibration of; as it is where there is none."""
     if calibration is None:
         return request
-    return replace(request, middle=(calibration.cx, calibration.cy), doffs=calibration.doffs)
+    middle, aspect = (calibration.cx, calibration.cy), calibration.fy / calibration.fx
+    return replace(request, middle=middle, doffs=calibration.doffs, aspect=aspect)
 
 
 def require_calibration(calibration: object) -> None:

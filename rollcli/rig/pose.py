@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from rollcli.estimator.estimate import RollEstimate
 from rollcli.estimator.interval import Tangent
+from rollcli.estimator.road.model import rig_turns
 from rollcli.rig.calibration import LIKELY_BASELINE, Calibration
 
 _AT_EDGE = "; its principal point lies near the edge: is it of images of this size?"
@@ -105,27 +106,19 @@ def with_pose(estimate: RollEstimate, calibration: Calibration) -> RollEstimate:
         return replace(estimate, message="; ".join(filter(None, [estimate.message, why])))
     pose = pose_of(tangent, calibration)
     pitch_ci95, height_ci95 = _half_widths(tangent, calibration, pose)
-    turns = turns_of(tangent.theta, calibration)
+    turns = rig_turns(tangent.theta, calibration.fy / calibration.fx)
+    # a place beside the lane is nearer by the pitch, and where the estimate knew of no other fy than fx
+    nearer = math.cos(pose.pitch) * turns / rig_turns(tangent.theta, tangent.grid.aspect)
     return replace(
         estimate,
         theta=pose.roll,
         ci95=None if estimate.ci95 is None else min(estimate.ci95 * turns, math.pi / 2),
-        camber=None if estimate.camber is None else estimate.camber * (turns * math.cos(pose.pitch)) ** 2,
+        camber=None if estimate.camber is None else estimate.camber * nearer**2,
         pitch=pose.pitch,
         pitch_ci95=pitch_ci95,
         height_m=pose.height,
         height_ci95_m=height_ci95,
     )
-
-
-def turns_of(theta: float, calibration: Calibration) -> float:
-    """Return by how much more than the image the rig turns: tan(roll) = fx / fy tan(theta).
-
-    A place beside the road is nearer to its middle by the same factor than it would be with square pixels,
-    in camera heights; and by the cosine of the pitch than it would be below a camera that is level.
-    """
-    ratio = calibration.fy / calibration.fx
-    return ratio / (ratio**2 * math.cos(theta) ** 2 + math.sin(theta) ** 2)
 
 
 def horizon_row(tangent: Tangent, calibration: Calibration) -> float | None:

@@ -311,7 +311,8 @@ def test_errors_have_the_covariance_that_those_of_the_parabola_imply(size):
 
 def touched(disparity, alpha=None):
     """The tangent of a map's parabola, or of another, amid all of its pixels, and the mean of their rows."""
-    surface = whole_surface(take_sample(disparity, None, TUNING.sample), energy := energy_of(disparity))
+    sample, energy = take_sample(disparity, None, TUNING.sample), energy_of(disparity)
+    surface = whole_surface(sample, energy, Request())
     u, v = (each * surface.grid.scale for each in (surface.x, surface.y))
     y = (v + 119.5) * math.cos(THETA) - (u + 159.5) * math.sin(THETA)
     return touch(alpha or energy.parabola(THETA), THETA, GRID, surface, None), y.mean()

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+import rollcli
 from rollcli.estimator.estimate import estimate_roll
 from rollcli.estimator.interval import Tangent
 from rollcli.rig.calibration import Calibration
@@ -64,18 +65,22 @@ def test_the_interval_of_the_roll_is_turned_as_the_roll_is():
     assert posed.tangent.theta == estimate.theta
 
 
-@pytest.mark.parametrize(("fy", "pitch"), [(160, 0.0), (200, 0.0), (300, 0.0), (160, 0.3), (200, 0.3)])
+SHAPES = [(100, 0.0), (160, 0.0), (200, 0.0), (300, 0.0), (100, 0.3), (160, 0.3), (200, 0.3)]
+
+
+@pytest.mark.parametrize(("fy", "pitch"), SHAPES)
 @pytest.mark.parametrize("roll_deg", [0, 20])
-def test_the_camber_is_the_roads_whatever_the_shape_of_pixels_and_the_pitch(fy, roll_deg, pitch):
+def test_roll_and_camber_of_a_crown_are_true_whatever_the_shape_of_pixels_and_the_pitch(fy, roll_deg, pitch):
     v, u = np.mgrid[:240, :320]
     x, y, roll = (u - 159.5) / 200, (v - 119.5) / fy, math.radians(roll_deg)
     across, below = x * math.cos(roll) + y * math.sin(roll), y * math.cos(roll) - x * math.sin(roll)
     down = below * math.cos(pitch) + math.sin(pitch)
     # 1.5 m below the rig, a crown that falls by 0.02 / 2 of the camera's height this far to the side
     crown = 100 / 3 * (down + np.sqrt(np.maximum(down**2 - 0.04 * across**2, 0)))
-    estimate = estimate_roll(np.where(down > 0.1, crown, 0))
-    posed = with_pose(estimate, Calibration(200.0, fy, 159.5, 119.5, 0.5))
-    assert posed.camber == pytest.approx(-0.02, abs=0.001)
+    view, rig = np.where(down > 0.1, crown, 0), Calibration(200.0, fy, 159.5, 119.5, 0.5)
+    found, later = rollcli.estimate_roll(view, calibration=rig), with_pose(estimate_roll(view), rig)
+    assert (found.camber, later.camber) == pytest.approx((-0.02, -0.02), abs=0.001)
+    assert found.theta == pytest.approx(roll, abs=1e-4)
 
 
 def noisy_plane(rng):

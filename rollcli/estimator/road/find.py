@@ -41,16 +41,20 @@ class Road:
         The share of the road-like pixels ahead that lie on the plane, less those below it; at most 1.
     rival : float
         The best score of another plane, one whose roll differs by `DoubtTuning.other_angle` or more.
+    aspect : float
+        See `Request`.
     """
 
     plane: Floats
     score: float
     rival: float
+    aspect: float
 
     @property
     def model(self) -> RoadModel:
         """The plane as a road without curvature."""
-        return RoadModel.of_plane(*self.plane.tolist())
+        c0, c1, c2 = self.plane.tolist()
+        return RoadModel.of_plane(c0, c1, c2, self.aspect)
 
     @property
     def horizon(self) -> float:
@@ -94,14 +98,15 @@ def find_road(sample: Sample, request: Request) -> Road:
             break
     planes = start = planes[list(best.values())]
     planes = judge.refined(planes)
-    within = np.abs(planes[:, 1]) <= math.tan(request.max_roll) * planes[:, 2]
+    within = np.abs(planes[:, 1]) <= request.max_tangent * planes[:, 2]
     planes = planes[within] if within.any() else start[:1]
     scores, rolls = judge.scores(planes, slice(None)), _rolls(planes)
     winner = int(scores.argmax())
     if not planes[winner, 2] > 0:  # fitted to no pixel, it scores 0, and the others have more against them
         raise EstimationError(HARDLY_A_PIXEL)
     far = np.abs(rolls - rolls[winner]) > other
-    return Road(planes[winner].astype(np.float64), float(scores[winner]), float(scores[far].max(initial=-1)))
+    plane, rival = planes[winner].astype(np.float64), float(scores[far].max(initial=-1))
+    return Road(plane, float(scores[winner]), rival, sample.grid.aspect)
 
 
 def _why_no_plane(sample: Sample, max_roll: float) -> str:
@@ -143,7 +148,7 @@ def draw_planes(sample: Sample, request: Request) -> Singles:
     wide = (np.abs(area) > 0.03 * radius**2) & (np.maximum(np.abs(y1), np.abs(y2)) < radius)
     area = np.where(wide, area, 1)
     c1, c2 = (d1 * y2 - d2 * y1) / area, (x1 * d2 - x2 * d1) / area
-    good = (wide & (c2 > 0) & (np.abs(c1) <= math.tan(request.max_roll) * c2)).nonzero()[0][: draws // 2]
+    good = (wide & (c2 > 0) & (np.abs(c1) <= request.max_tangent * c2)).nonzero()[0][: draws // 2]
     return np.asarray(np.stack([d[a] - c1 * x[a] - c2 * y[a], c1, c2], 1)[good])
 
 
@@ -171,7 +176,8 @@ class Judge:
         products = (self._rows[:3, None] * self._rows[None]).reshape(12, -1) * self._near
         # sums of single precision differ by BLAS: planes by a 50,000th, angles of pairs by 0.006 degrees
         self._products = products.astype(np.float64)
-        self._bearings = np.stack([-y / d, x / d])
+        aspect = np.float32(sample.grid.aspect)
+        self._bearings = np.stack([-y / (aspect * d), aspect * x / d])
         self._slopes = np.stack([-across, -along, np.ones_like(d), across**2 + along**2])
         # below a plane a coherent pixel costs twice as much as one that is merely off it
         self._caps = np.where(sample.coherent, np.float32(math.sqrt(2)), np.float32(1))
@@ -263,7 +269,8 @@ def road_plane(
     tuning = request.tuning.sample
     noise, uneven = smaller * tuning.noise_share, smaller * tuning.uneven_share
     try:
-        sample = take_sample(disparity, usable, replace(tuning, noise_share=noise, uneven_share=uneven))
+        tuning = replace(tuning, noise_share=noise, uneven_share=uneven)
+        sample = take_sample(disparity, usable, tuning, aspect=request.aspect)
         c0, c1, c2 = find_road(sample, request).plane.tolist()
     except EstimationError:
         return None

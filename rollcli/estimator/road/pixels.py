@@ -67,7 +67,7 @@ def select_pixels(checked: CheckedMap, request: Request) -> PixelSet:
     tuning, values, usable = request.tuning, checked.values, checked.usable
     road, surface = None, None
     if request.road == "auto":
-        sample = take_sample(values, usable, tuning.sample, request.middle)
+        sample = take_sample(values, usable, tuning.sample, request.middle, request.aspect)
         road = find_road(sample, request)
         surface = fit_surface(sample, road, request)
     if request.method in AREAS:
@@ -96,6 +96,7 @@ def _sampled_surface(
     values: NDArray[Any], used: Bools | None, energy: Energy, request: Request
 ) -> Surface | None:
     try:
-        return whole_surface(take_sample(values, used, request.tuning.sample, request.middle), energy)
+        sample = take_sample(values, used, request.tuning.sample, request.middle, request.aspect)
+        return whole_surface(sample, energy, request)
     except EstimationError:  # too small a map to be sampled: an angle without an interval
         return None

@@ -120,6 +120,7 @@ def take_sample(
     usable: Bools | None,
     tuning: SampleTuning,
     middle: tuple[float, float] | None = None,
+    aspect: float = 1.0,
 ) -> Sample:
     """Sample a map.
 
@@ -131,6 +132,7 @@ def take_sample(
         Pixels that may be taken; neighbours outside still count as neighbours.
     tuning : SampleTuning
     middle : tuple of float, optional
+    aspect : float
         See `Request`.
 
     Returns
@@ -145,7 +147,7 @@ def take_sample(
     """
     disparity = np.ascontiguousarray(disparity)
     height, width = disparity.shape
-    grid, reach = Grid.of_shape(height, width, middle), reach_of(height, width, tuning)
+    grid, reach = Grid.of_shape(height, width, middle, aspect), reach_of(height, width, tuning)
     spacing, chosen = _chosen(disparity, usable, reach, tuning)
     lattice = _lattice(grid, height, width, reach, spacing)
     places, x, y, column = (each.take(chosen, mode="clip") for each in lattice)

@@ -110,7 +110,8 @@ class Surface:
         tolerance = tolerances(disparity, self.noise, tuning.sample)
         on_it: Bools = np.abs(road - disparity) < self.limit * tolerance
         if self.level is not None:
-            side = self.model.side(self.model.across(x, y), road)
+            lateral = self.model.lateral(self.model.across(x, y), self.model.along(x, y))
+            side = self.model.side(lateral, road)
             on_it &= _level_at(self.level, side, tuning.fit) > _LEAST_LEVEL
         # where a wall crosses the surface it is as near as the road, but it does not rise as the road does
         off = disparity - road
@@ -122,11 +123,22 @@ class Surface:
         return on_it & rises
 
 
-def whole_surface(sample: Sample, energy: Energy) -> Surface:
+def _with_lane_ahead(sample: Sample, theta: float, request: Request) -> Sample:
+    """Move a sample's origin to where the lane ahead of an image rolled by theta crosses its row."""
+    if request.middle is None:
+        return sample
+    grid = sample.grid
+    column = column_ahead(theta, request.middle, grid.centre_v, grid.aspect)
+    right = np.float32((column - grid.centre_u) / grid.scale)
+    return replace(sample, grid=replace(grid, centre_u=column), x=sample.x - right)
+
+
+def whole_surface(sample: Sample, energy: Energy, request: Request) -> Surface:
     """Return a surface that takes every sampled pixel for road."""
-    x, y, d = (values.astype(np.float64) for values in (sample.x, sample.y, sample.d))
     _, c1, c2 = energy.plane
-    plane = RoadModel.of_plane(0.0, c1, c2)
+    plane = RoadModel.of_plane(0.0, c1, c2, sample.grid.aspect)
+    sample = _with_lane_ahead(sample, plane.theta, request)
+    x, y, d = (values.astype(np.float64) for values in (sample.x, sample.y, sample.d))
     rows = powers(plane.along(x, y), 2)
     rows[2] *= energy.parabolic
     alpha = solve_normal(rows @ rows.T, rows @ d)
@@ -158,11 +170,9 @@ def fit_surface(sample: Sample, road: Road, request: Request) -> Surface:
     EstimationError
         When hardly any pixel lies on the road.
     """
-    if request.middle is not None:  # the origin moves to where the rolled lane crosses its row
-        column = column_ahead(road.model.theta, request.middle, sample.grid.centre_v)
-        right = (column - sample.grid.centre_u) / sample.grid.scale
-        road = replace(road, plane=road.plane + np.array([right * road.plane[1], 0, 0]))
-        sample = replace(sample, grid=replace(sample.grid, centre_u=column), x=sample.x - np.float32(right))
+    before, sample = sample.grid, _with_lane_ahead(sample, road.model.theta, request)
+    right = (sample.grid.centre_u - before.centre_u) / before.scale
+    road = replace(road, plane=road.plane + np.array([right * road.plane[1], 0, 0]))
     near = _near_pixels(sample, road, request)
     lane = near.lane(road.model)
     level, near = near.profiled(lane)
@@ -249,7 +259,7 @@ class NearPixels:
         tuning = self.tuning
         across, along = lane.turned(self.places)
         road = np.maximum(lane.disparity_along(along), self.d / 10)
-        side = lane.side(across, road)
+        side = lane.side(lane.lateral(across, along), road)
         places = np.floor(side / np.float32(2 * tuning.profile / _BINS)) + _BINS
         seen = (self.place > 0.1) & (road > self.d / 10) & (places >= 0) & (places < 2 * _BINS)
         seen = seen.nonzero()[0]
@@ -287,7 +297,7 @@ class NearPixels:
         model, design = start, np.ones((6, len(self.d)), np.float32)
         across, along = start.turned(self.places)
         # of the start: camber adds so much the same to roads that differ little
-        design[3] = start.bulge(across, start.disparity_along(along))
+        design[3] = start.bulge(start.lateral(across, along), start.disparity_along(along))
         squares = self._place_on(design, model)
         weights = self._weights(squares, limit)
         for _ in range(_ROUNDS):
@@ -356,7 +366,8 @@ def _near_pixels(sample: Sample, road: Road, request: Request) -> NearPixels:
     bottom = sample.grid.centre_v / sample.grid.scale / math.cos(model.theta)
     beyond = (along + fit.other_roll * np.abs(across) - bottom) * (10 / fit.other_roll)
     place = np.square(place) / (1 + np.exp(np.minimum(beyond, MOST_FADED)))
-    ahead = np.square(np.square(across * (model.alpha[1] / tuning.search.corridor) / mean))
+    lateral = model.lateral(across, along)
+    ahead = np.square(np.square(lateral * (model.alpha[1] / tuning.search.corridor) / mean))
     # the steps of a map of whole pixels are no spread: within less, only stripes of one value are left
     least = max(_LEAST_WIDTH, sample.quantum / quantile(sample.tolerance[sample.few], 0.5))
     return NearPixels(
@@ -410,4 +421,5 @@ def _moved(model: RoadModel, products: Floats) -> RoadModel:
     d0, d1, d2, camber, turned = solve_normal(products[:5, :5], products[:5, 5]).tolist()
     a0, a1, a2 = model.alpha
     turned = max(-_MOST_TURN, min(_MOST_TURN, turned))
-    return RoadModel(model.theta + turned, (a0 + d0, a1 + d1, a2 + d2), model.camber + camber)
+    alpha = a0 + d0, a1 + d1, a2 + d2
+    return RoadModel(model.theta + turned, alpha, model.camber + camber, model.aspect)

@@ -15,7 +15,6 @@ chosen area may hold an obstacle; among many, the road's are those whose planes 
 5. The angle is that of the best plane of all pixels of these areas.
 """
 
-import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -201,12 +200,12 @@ def iterative(disparity: NDArray[Any], usable: Bools, request: Request, chosen: 
         raise EstimationError(f"no area of {extent}x{extent} pixels is at least half valid")
     grams = grams[filled]
     planes = _planes(grams)
-    roads = _look_like_road(planes, request.max_roll)
+    roads = _look_like_road(planes, request.max_tangent)
     if not roads.any():
         if (found := disparity[usable]).min() == found.max():
             raise EstimationError(SAME_EVERYWHERE)
         raise EstimationError("no area looks like a road: disparity grows downward in none")
-    agreeing, rounds, status = _agreeing(grams, planes, roads, request.max_roll)
+    agreeing, rounds, status = _agreeing(grams, planes, roads, request.max_tangent)
     covered, step = np.zeros_like(usable), _STEP * side
     for row, column in zip(*np.divmod(filled[agreeing], across), strict=True):
         covered[row * step : row * step + extent, column * step : column * step + extent] = True
@@ -229,14 +228,14 @@ def _misfit(grams: Floats, planes: Floats) -> Floats:
     return np.asarray(np.sqrt(np.maximum(squares, 0)))
 
 
-def _look_like_road(planes: Floats, max_roll: float) -> Bools:
+def _look_like_road(planes: Floats, max_tangent: float) -> Bools:
     """Return which planes (N, 3) have a disparity that grows downward, and a roll within bounds."""
     c0, c1, c2 = planes.T
-    return np.asarray((c2 > _LEVEL * np.abs(c0)) & (np.abs(c1) <= math.tan(max_roll) * c2))
+    return np.asarray((c2 > _LEVEL * np.abs(c0)) & (np.abs(c1) <= max_tangent * c2))
 
 
 def _agreeing(
-    grams: Floats, planes: Floats, roads: Bools, max_roll: float
+    grams: Floats, planes: Floats, roads: Bools, max_tangent: float
 ) -> tuple[Bools, int, SolverStatus]:
     """Return which areas (A,) share one plane, after how many rounds, and whether these settled.
 
@@ -248,8 +247,8 @@ def _agreeing(
         Their own planes.
     roads : ndarray of bool, shape (A,)
         Which of these look like a road and compete to be the best.
-    max_roll : float
-        Radians.
+    max_tangent : float
+        See `Request`.
     """
     competing = np.flatnonzero(roads)[:: max(1, np.count_nonzero(roads) // _TRIED)]
     misfit = _misfit(grams, planes[competing])
@@ -261,7 +260,7 @@ def _agreeing(
     for rounds in range(1, _ROUNDS + 1):
         plane = _planes(grams[chosen].sum(axis=0, keepdims=True))
         again = _misfit(grams, plane)[:, 0] <= tolerance
-        if not again.any() or not _look_like_road(plane, max_roll).all():
+        if not again.any() or not _look_like_road(plane, max_tangent).all():
             return chosen, rounds, SolverStatus.DRIFTED
         if (again == chosen).all():
             return chosen, rounds, SolverStatus.CONVERGED
