@@ -65,10 +65,9 @@ def test_the_interval_of_the_roll_is_turned_as_the_roll_is():
     assert posed.tangent.theta == estimate.theta
 
 
-SHAPES = [(100, 0.0), (160, 0.0), (200, 0.0), (300, 0.0), (100, 0.3), (160, 0.3), (200, 0.3)]
-
-
-@pytest.mark.parametrize(("fy", "pitch"), SHAPES)
+@pytest.mark.parametrize(
+    ("fy", "pitch"), [(300, 0), *((fy, up) for fy in (100, 160, 200) for up in (0, 0.3))]
+)
 @pytest.mark.parametrize("roll_deg", [0, 20])
 def test_roll_and_camber_of_a_crown_are_true_whatever_the_shape_of_pixels_and_the_pitch(fy, roll_deg, pitch):
     v, u = np.mgrid[:240, :320]

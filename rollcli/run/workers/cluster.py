@@ -230,12 +230,14 @@ class ClusterFuture(Generic[Task, Result]):
         WorkerError
             The scheduler is lost, or workers cannot do the work.
         """
+        self._executor.check_connection()
         try:
-            self._executor.check_connection()
             error = self._sent.exception()
             if error is None:
                 found: Done[Result] = pickle.loads(self._sent.result())  # noqa: S301 (as Dask does)
                 return found
+        except (WorkerError, TimeoutError):  # it was lost, and came to a worker that cannot take part
+            return self._executor.retry(self._chunk)
         except (CancelledError, OSError) as lost:  # the latter where it is lost amid a result
             raise _connection_lost(self._executor.address) from lost
         if _is_death(error):

@@ -10,6 +10,7 @@ import sys
 import threading
 from importlib.util import find_spec
 from itertools import count
+from unittest.mock import Mock
 
 import pytest
 
@@ -252,6 +253,12 @@ def test_a_worker_that_joins_later_and_cannot_take_part_gets_no_work_also_when_a
     assert said.endswith(f"{problem}; it gets no work\n")
     assert not (odd / "worked").exists()
     assert len((far / "rolls.csv").read_text().splitlines()) == 1 + FRAMES + 400
+
+
+def test_a_result_that_was_lost_and_came_to_a_worker_that_cannot_take_part_is_made_again():
+    lost = Mock(**{"exception.return_value": None, "result.side_effect": WorkerError("does not see a.png")})
+    executor = Mock(**{"send.return_value": (lost, set())})
+    assert cluster.ClusterFuture(executor, [1], 0).result() is executor.retry.return_value
 
 
 def test_a_worker_that_has_no_such_program_or_files_or_may_not_write_is_named(tmp_path, monkeypatch):
