@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from itertools import product
 
 import cv2
 import numpy as np
@@ -65,9 +66,7 @@ def test_the_interval_of_the_roll_is_turned_as_the_roll_is():
     assert posed.tangent.theta == estimate.theta
 
 
-@pytest.mark.parametrize(
-    ("fy", "pitch"), [(300, 0), *((fy, up) for fy in (100, 160, 200) for up in (0, 0.3))]
-)
+@pytest.mark.parametrize(("fy", "pitch"), [(300, 0), *product((100, 160, 200), (0, 0.3))])
 @pytest.mark.parametrize("roll_deg", [0, 20])
 def test_roll_and_camber_of_a_crown_are_true_whatever_the_shape_of_pixels_and_the_pitch(fy, roll_deg, pitch):
     v, u = np.mgrid[:240, :320]
