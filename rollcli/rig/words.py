@@ -33,8 +33,14 @@ def answer(estimate: Estimate, quantity: Quantity = ROLL, *, change: bool = Fals
     text = f"{estimate.value:{sign}.{digits}f}"
     if float(text) == 0:
         text = text.lstrip("+-")
-    half = "" if estimate.ci95 is None else f" ± {max(estimate.ci95, 10.0**-digits):.{digits}f}"
+    half = "" if estimate.ci95 is None else f" {plus_or_minus(estimate.ci95)}"
     return f"{text}{half}{quantity.unit}"
+
+
+def plus_or_minus(half: float) -> str:
+    """Return the half-width of an interval, such as "± 0.06"; what is hardly any is never said to be none."""
+    digits = decimals(half)
+    return f"± {max(half, 10.0**-digits):.{digits}f}"
 
 
 def decimals(half: float | None) -> int:
