@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 ARCHIVES = (".zip", ".tar")
 BAGS = (".bag", ".db3", ".mcap")
-VIDEOS = (".mp4", ".avi", ".mkv", ".mov")
+VIDEOS = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm")
 _PACKED = (".tar.gz", ".tgz", ".tar.xz", ".tar.bz2", ".tar.zst", ".7z", ".rar")
 _KINDS = "|".join(each[1:] for each in (*ARCHIVES, *BAGS, *VIDEOS))
 _INSIDE = re.compile(rf"(.*?\.(?:{_KINDS}))#(.*)", re.IGNORECASE | re.DOTALL)

@@ -251,7 +251,8 @@ def open_recording(
     Parameters
     ----------
     path : str or path
-        A ROS 1 `.bag`, a `.db3`, an `.mcap` or a rosbag2 folder; or an `.mp4`, `.avi`, `.mkv` or `.mov`.
+        A ROS 1 `.bag`, a `.db3`, an `.mcap` or a rosbag2 folder; or a video: `.mp4`, `.m4v`, `.mov`, `.avi`,
+        `.mkv`, `.webm`.
     topic : str, optional
         The disparity or depth maps; the only topic that fits by default.
     left_topic, right_topic : str, optional

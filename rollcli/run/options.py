@@ -117,8 +117,8 @@ class PairOptions(NamedTuple):
     match : {"name", "order"}
         By name (the same but for left/right, l/r, L1/R1, image_2/image_3, im0/im1 …), or by order.
     side_by_side : str or None
-        INPUTS are images, or videos (.mp4, .avi, .mkv, .mov), that hold both views; left-right unless the
-        word is given.
+        INPUTS are images, or videos (.mp4, .m4v, .mov, .avi, .mkv, .webm), that hold both views; left-right
+        unless the word is given.
     """
 
     left: str | None = None

@@ -8,7 +8,7 @@ import pytest
 
 from rollcli.files.results import Row, format_row
 from rollcli.report.charts import all_charts
-from rollcli.rig.drive.assess import assess_rig
+from rollcli.rig.drive.assess import assess_rig, drive_of
 from tests.run_cli import rollcli
 
 START = 1_700_000_000_123_456_789
@@ -80,5 +80,6 @@ def test_the_axis_stays_that_of_frames_where_time_would_mislead():
     ):
         chart = all_charts(some, assess_rig(some))["roll"]
         assert chart.layout["xaxis"]["title"]["text"] == "frame"
+    assert drive_of("a/b.webm#000123") == "a/b.webm"
     mixed = assess_rig([*given[:50][::-1], *given[50:]])
     assert mixed.drift_per_hour(mixed.drives[0]).value is None

@@ -21,7 +21,7 @@ from typing import Any, BinaryIO, NamedTuple
 import cv2
 from numpy.typing import NDArray
 
-from rollcli.errors import InputError, UsageError, about, as_usage
+from rollcli.errors import InputError, UsageError, about
 from rollcli.files.bounded import state_of
 from rollcli.files.codecs.arrays import require_decoded_fits
 from rollcli.files.codecs.pictures import half_size
@@ -76,17 +76,15 @@ def frames_of(left: Input, right: Input, layout: str | None) -> list[tuple[Input
     Raises
     ------
     UsageError
-        A video is in a store, or has a frame that cannot be halved; or two differ in size; or in length, and
-        neither is cut off.
+        A video is in a store; or two differ in size; or in length, and neither is cut off.
     InputError
-        One cannot be opened, or has no frame.
+        One cannot be opened, or has no frame, or one that cannot be halved.
     """
     for each in (left, right):
         require_local(each.location)
     one = _known(left, decode=layout is None)
     if layout is not None:
-        with as_usage():
-            half_size(one.width, one.height, layout, left.name)
+        half_size(one.width, one.height, layout, left.name)
         return [(each, each) for each in _listed(one, left)]
     other = _known(right, decode=True)
     if (one.width, one.height) != (other.width, other.height):
@@ -114,7 +112,10 @@ def _listed(video: Video, source: Input) -> list[Input]:
 def read_video_frame(path: str, frame: str, name: str) -> NDArray[Any]:
     """Decode one frame of a video, BGR (H, W, 3); frames that follow each other are read in one pass."""
     if frame == "rest":
-        _known(Input(path, path), decode=False)  # which says why where it cannot be opened
+        video = _known(Input(path, path), decode=False)  # which says why where it cannot be opened
+        if not video.broken and (video.width % 2 or video.height % 2):  # of several: see `frames_of`
+            size = f"{video.width}x{video.height} px"
+            raise InputError(f"{name}: has frames of {size}, which cannot be halved into two views: cut them")
         raise InputError(f"{name}: {broken_end(path) or 'is whole'}; the whole frames before are used")
     if not frame.isdecimal():
         raise InputError(f"{name}: no such frame in {path}")

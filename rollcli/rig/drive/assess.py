@@ -27,7 +27,7 @@ _LEAST_SPREAD = 0.05  # degrees
 # rig, of 5 frames each, differed without it, and in 3 % with it
 _SWAY = 0.6
 # drive.mcap#/stereo/disparity@1700000000123456789, with .1 where a stamp is there twice; drive.mp4#000123
-_FRAME = re.compile(r"(?i)(.*?\.(?:bag|db3|mcap|mp4|avi|mkv|mov))#(?:.*@([0-9]{1,20})(?:\.[0-9]+)?)?")
+_FRAME = re.compile(r"(?i)(.*?\.(?!(?:zip|tar)#)\w+)#(?:.*@([0-9]{1,20})|[0-9]+$|rest$)")
 _IN_ARCHIVE = re.compile(r"(?i)(?<=\.(?:zip|tar))#(?=[^/]*$)")  # of run.zip#0001.png, in no folder there
 _NS = 1e-9
 _LEAST_S = 1e-6  # from frame to frame: the stamps of a recorder that has no clock count its frames

@@ -285,8 +285,9 @@ def test_what_is_no_usable_video_is_told_in_a_line(tmp_path, drive):
         done = rollcli("estimate", *given, cwd=tmp_path)
         assert (done.status, done.out, done.err.count("\n")) == (2, "", 1), (given, done.err)
         assert expected in done.err, done.err
-    done = rollcli("estimate", "narrow.mkv", "--side-by-side", *camera, "40,60", cwd=tmp_path)
-    assert len(rows(done.out)) == COUNT, done.err
+    done = rollcli("estimate", "narrow.mkv", "odd.avi", "--side-by-side", *camera, "40,60", cwd=tmp_path)
+    assert len(rows(done.out)) == COUNT + 1, done.err
+    assert "odd.avi#rest: has frames of 101x120 px, which cannot be halved into two views" in done.err
 
 
 def test_python_iterates_the_frames_of_a_video(tmp_path, drive):
@@ -367,17 +368,14 @@ def test_lengths_that_a_video_says_in_other_ways_say_the_same(tmp_path, name, co
 
 def test_frames_of_a_video_are_read_in_any_order_and_others_are_errors(tmp_path, drive):
     views = beside(drive[2])
-    write_video(tmp_path / "drive.mkv", views)
+    write_video(tmp_path / "drive.mkv", views).rename(tmp_path / "drive.webm")
     for number in (3, 0, 0, 4):
-        np.testing.assert_array_equal(read_image(tmp_path / f"drive.mkv#{number:06d}"), views[number])
-    names = [f"drive.mkv#{each}" for each in ("000001", "000099", "one", "rest")]
-    done = rollcli("estimate", *names, "--side-by-side", cwd=tmp_path)
-    assert (done.status, {row["file"]: row["message"] for row in rows(done.out)}) == (
-        3,
-        {
-            "drive.mkv#000001": "",
-            "drive.mkv#000099": "no such frame: drive.mkv has 5 that can be decoded",
-            "drive.mkv#one": "no such frame in drive.mkv",
-            "drive.mkv#rest": "is whole; the whole frames before are used",
-        },
-    )
+        np.testing.assert_array_equal(read_image(tmp_path / f"drive.webm#{number:06d}"), views[number])
+    expected = {
+        "drive.webm#000001": "",
+        "drive.webm#000099": "no such frame: drive.webm has 5 that can be decoded",
+        "drive.webm#one": "no such frame in drive.webm",
+        "drive.webm#rest": "is whole; the whole frames before are used",
+    }
+    done = rollcli("estimate", *expected, "--side-by-side", cwd=tmp_path)
+    assert (done.status, {row["file"]: row["message"] for row in rows(done.out)}) == (3, expected)
