@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, overload
 
-from rollcli.errors import InputError, UsageError
+from rollcli.errors import InputError, UsageError, as_usage
 from rollcli.extras import require_extra
 from rollcli.files.atomic import is_file
 from rollcli.files.bounded import as_utf8
@@ -134,13 +134,16 @@ def mask_finder(mask: str | None) -> Callable[[str], str | None]:
     Raises
     ------
     UsageError
-        There is no such file or folder.
+        There is no such file or folder, or a store does not give it.
     """
     if mask is not None and is_place(mask):
         found = find_inputs([mask], Search(recursive=True))
         by_stem = gathered((_stem(each.name), each.location) for each in found)
         return lambda name: None if _is_broken(name) else _only(by_stem, _stem(name), "mask", name, mask)
-    if mask is not None and not (is_url(mask) or is_file(file_of(mask))):
+    if mask is not None and is_url(mask):
+        with as_usage():
+            read_bytes(mask)
+    elif mask is not None and not is_file(file_of(mask)):
         raise UsageError(f"{mask}: no such mask file or folder")
     return lambda name: mask
 
@@ -383,7 +386,7 @@ def _pairs(options: FramesOptions) -> Iterator[_Named]:
 def _frames_of(left: Input, right: Input, layout: Layout | None, *, alone: bool) -> list[tuple[Input, Input]]:
     """List the frames of two videos, or of one that holds both views; images are a pair themselves.
 
-    Unless it is alone, a video of both views that cannot be opened is one frame, which fails and says why.
+    Unless it is alone, a video of both views that cannot be used is one frame, which fails and says why.
     """
     if not (is_video(left.location) or is_video(right.location)):
         return [(left, right)]

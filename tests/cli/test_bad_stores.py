@@ -75,6 +75,7 @@ def test_what_a_store_objects_to_is_said_before_any_work(bucket, store, tmp_path
         (["disparity", *VIEWS, "-o", "d", "--preview", "s3://nowhere/p"], "there is no such bucket"),
         (["rig", "s3://maps/none.csv"], "there is no such object"),
         (["estimate", *VIEWS, "--align", "s3://maps/none.json"], "there is no such object"),
+        (["estimate", *VIEWS, "--mask", "s3://maps/none.png"], "there is no such object"),
         (["evaluate", "paper", "maps", "-o", "s3://nowhere/p"], "there is no such bucket"),
     ],
 )
