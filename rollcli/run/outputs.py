@@ -13,7 +13,7 @@ from unicodedata import normalize
 from rollcli.errors import InputError, OutputError, UsageError
 from rollcli.files import storage
 from rollcli.files.atomic import is_folder, mark_path, remove_leftovers
-from rollcli.files.containers import file_of, shown
+from rollcli.files.containers import BAGS, file_of, is_archive, shown
 from rollcli.files.naming import gathered
 from rollcli.files.results import STATUSES
 from rollcli.files.storage import create, read_bytes, remove, remove_all, write_bytes
@@ -152,10 +152,13 @@ def _written_twice(path: str, first: str, second: str) -> str:
         return f"{path}: would be a result of this run and an image of {second}; write them apart"
     if first == second:
         return f"{path}: two images of {first} would be written there; give each kind a folder of its own"
-    return (
-        f"{first} and {second} would both write {path}; run them apart, or name their common folder with "
-        "--recursive"
-    )
+    files = file_of(first), file_of(second)
+    within_archives = (first, second) if is_archive(files[0]) else files
+    folders = {posixpath.dirname(each.replace("#", "/")) for each in within_archives}
+    # bags are not searched for in folders
+    told_apart = len(folders) > 1 and not files[0].lower().endswith(BAGS)
+    hint = "or name their common folder with --recursive" if told_apart else "each into a folder of its own"
+    return f"{first} and {second} would both write {path}; run them apart, {hint}"
 
 
 def check_places(frames: Sequence[Frame], folders: Iterable[str] = ()) -> None:
