@@ -182,6 +182,9 @@ def _add_pairs(
     bag.frames = [(lefts[one], rights[other]) for one, other in pairs.items()]
     within = f"within {tolerance_ns / 1e6:g} ms"
     if not pairs and lefts and rights:
+        with as_usage():  # what is compressed by itself has no stamps
+            path, _, member = lefts[0].location.partition("#")
+            read_frame(path, member, lefts[0].name)
         some = nearest(*stamps, sys.maxsize).items()
         apart = min(abs(stamps[0][one] - stamps[1][other]) for one, other in some) / 1e6
         far = f"no views of {left} and {right} are {within}, the nearest are {apart:g} ms apart"
