@@ -88,8 +88,10 @@ class RunRecord:
         plan, options = self.plan, self.plan.options
         fixed = {"rollcli": __version__, "options": _effective(plan), "inputs": names_of(plan.frames)}
         if options.calibration.given:
-            fixed["calibration"] = _calibrations(plan.frames)
-            if damaged := [frame.file for frame in plan.frames if frame.damaged]:
+            # in one pass: frames of a sorted list are made anew in each
+            seen = dict.fromkeys((frame.calibration, frame.damaged and frame.file) for frame in plan.frames)
+            fixed["calibration"] = _calibrations(each for each, _ in seen)
+            if damaged := [file for _, file in seen if file]:
                 fixed[_DAMAGED] = damaged
         if options.paired and (correction := options.stereo.correction) is not None:
             fixed["correction"] = correction.as_record()  # its file may be written anew
@@ -173,9 +175,9 @@ def _by_name(options: Options) -> dict[str, Any]:
     return asdict(options) if isinstance(options, StereoOptions) else options._asdict()
 
 
-def _calibrations(frames: Sequence[Frame]) -> dict[str, Any]:
+def _calibrations(of_frames: Iterable[Calibration | None]) -> dict[str, Any]:
     """List the first few calibrations used, and where they are from; count how many differ."""
-    used = dict.fromkeys(frame.calibration for frame in frames if frame.calibration is not None)
+    used = dict.fromkeys(each for each in of_frames if each is not None)
     digest = hashlib.sha256("\n".join(map(repr, used)).encode("utf-8", "surrogateescape"))
     return {
         "different": len(used),
@@ -487,7 +489,8 @@ def _differences(kept: KeptRows, was: Mapping[str, Any] | None, record: RunRecor
     again = "; --update does again what has changed" if updates else ""
     if isinstance(was.get(_DAMAGED), list):  # their rows are errors until --retry-failed, mended or not
         damaged = set(map(str, was[_DAMAGED]))
-        now = {**now, "calibration": _calibrations([each for each in frames if each.file not in damaged])}
+        sound = _calibrations(frame.calibration for frame in frames if frame.file not in damaged)
+        now = {**now, "calibration": sound}
     if was.get("calibration") != json.loads(json.dumps(now.get("calibration"))):
         yield f"the calibration differs{again}"
     columns = list(plan.further)
