@@ -296,8 +296,6 @@ def _match(frame: Frame, options: FramesOptions) -> Source:
     allowed = region_mask(frame.mask, options, matched_shape(left.shape, options.stereo.downscale))
     find_road = road_finder(allowed, options.method.request())
     source = matched_source((left, right), options.stereo, find_road, frame.calibration)
-    if not np.any(source.disparity):
-        raise InputError(f"{frame.file}: no pixel could be matched with the right image")
     drawn_on = options.images.road_mask is not None or options.images.heights_preview is not None
     return replace(source, photo=left if drawn_on else None, allowed=allowed)
 
@@ -333,6 +331,8 @@ def matched_source(
     from rollcli.stereo.match import MUCH_AT_END, match_pair
 
     match = match_pair(*views, options, find_road, rig)
+    if not np.any(match.disparity):
+        raise InputError("no pixel could be matched with the right image")
     height, width = views[0].shape[:2]
     searched = (match.min_disparity, match.min_disparity + match.num_disparities - 1)
     at_end = f"{match.end_fraction:.0%} of the map lies at the end of the searched range"
