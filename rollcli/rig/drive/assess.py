@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import UsageError
-from rollcli.rig.drive.posterior import Estimate, Flags, Floats
+from rollcli.rig.drive.posterior import TUNING, Estimate, Flags, Floats
 from rollcli.rig.drive.quantity import Segment, SequenceAssessment, assess_sequence
 from rollcli.rig.quantities import ALIGNMENT, BOUNDS, COLUMNS, QUANTITIES, ROLL, SIZE, Quantity
 
@@ -23,9 +23,6 @@ AUTO, NONE = "auto", "none"
 _FRAMES_OF_A_DRIVE = 8  # folders of fewer frames on average are not drives but single frames
 _APART = 4.0  # standard deviations within a group; medians of a hundred groups of one rig are 3.5 apart
 _LEAST_SPREAD = 0.05  # degrees
-# degrees; 95 % of a car's sway, of which a few frames show a part. In 98 % of trials some of 30 drives of one
-# rig, of 5 frames each, differed without it, and in 3 % with it
-_SWAY = 0.6
 # drive.mcap#/stereo/disparity@1700000000123456789, with .1 where a stamp is there twice; drive.mp4#000123
 _FRAME = re.compile(r"(?i)(.*?\.(?!(?:zip|tar)#)\w+)#(?:.*@([0-9]{1,20})|[0-9]+$|rest$)")
 _IN_ARCHIVE = re.compile(r"(?i)(?<=\.(?:zip|tar))#(?=[^/]*$)")  # of run.zip#0001.png, in no folder there
@@ -397,7 +394,7 @@ def _compared(drives: Sequence[DriveAssessment]) -> tuple[DriveAssessment, ...]:
 def _spread(found: SequenceAssessment) -> float:
     """How far a few frames are apart, and a car sways: what there is where there is no interval."""
     used = found.series.values[found.series.used]
-    return max(_SWAY, float(np.ptp(used))) if len(used) > 1 else math.inf
+    return max(TUNING.sway, float(np.ptp(used))) if len(used) > 1 else math.inf
 
 
 def _frames(rows: Any) -> RigFrames:

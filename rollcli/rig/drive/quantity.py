@@ -258,6 +258,8 @@ def _prepared(values: Floats, errors: Floats, unit: float) -> tuple[Series, int]
     own = np.maximum(np.where(known, errors, usual), TUNING.least_error * unit) ** 2
     gross = np.zeros(len(values), dtype=bool)
     gross[used] = gross_outliers(values[used], own[used])
+    if gross.any() and used.sum() < TUNING.fewest:
+        gross &= np.abs(values - np.median(values[used])) > TUNING.sway * unit
     kept = used & ~gross
     return Series(np.where(kept, values, 0.0), own, kept), int(gross.sum())
 

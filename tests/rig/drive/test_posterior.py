@@ -178,8 +178,7 @@ def test_whatever_counts_gives_a_mean_among_its_frames(frames, count, where):
     found = assess_sequence(values, np.full(frames, 0.05))
 
     assert found.used == count
-    mean = found.segments[-1].mean.value
-    assert np.nanmin(values) - 1e-9 <= mean <= np.nanmax(values) + 1e-9
+    assert np.nanmin(values) - 1e-9 <= found.segments[-1].mean.value <= np.nanmax(values) + 1e-9
     assert (found.now.ci95 is None) == (count < 8)
     assert (found.drift.value is None) or count >= 8
 
@@ -190,6 +189,7 @@ def test_gross_outliers_are_found_and_good_frames_are_not_called_so(phi, sd):
     for few, at in ((8, 6), (13, 6), (60, 20)):
         assert gross_outliers(np.eye(few)[at] * 80, errors[:few] ** 2).nonzero()[0].tolist() == [at]
     assert gross_outliers(values, errors**2).sum() <= 3
+    assert sum(assess_sequence(each, errors[:3]).outliers for each in values[:600].reshape(-1, 3)) <= 8
     rng = np.random.default_rng(6)
     bad = rng.random(3000) < 0.05
     values[bad] += rng.choice([-1, 1], bad.sum()) * rng.uniform(5, 30, bad.sum())
