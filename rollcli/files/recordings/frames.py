@@ -183,7 +183,7 @@ def _add_pairs(
     within = f"within {tolerance_ns / 1e6:g} ms"
     if not pairs and lefts and rights:
         with as_usage():  # what is compressed by itself has no stamps
-            path, _, member = lefts[0].location.partition("#")
+            path, _, member = split_position(lefts[0].location)[0].rpartition("#")
             read_frame(path, member, lefts[0].name)
         some = nearest(*stamps, sys.maxsize).items()
         apart = min(abs(stamps[0][one] - stamps[1][other]) for one, other in some) / 1e6
