@@ -257,14 +257,12 @@ def _prepared(values: Floats, errors: Floats, unit: float) -> tuple[Series, int]
         usual = float(np.median(steps)) if len(steps) else 0.0
     own = np.maximum(np.where(known, errors, usual), TUNING.least_error * unit) ** 2
     gross = np.zeros(len(values), dtype=bool)
-    gross[used] = gross_outliers(values[used], own[used])
-    if gross.any() and used.sum() < TUNING.fewest:
-        gross &= np.abs(values - np.median(values[used])) > TUNING.sway * unit
+    gross[used] = gross_outliers(values[used], own[used], unit)
     kept = used & ~gross
     return Series(np.where(kept, values, 0.0), own, kept), int(gross.sum())
 
 
-def gross_outliers(values: Floats, variances: Floats) -> Flags:
+def gross_outliers(values: Floats, variances: Floats, unit: float = 1.0) -> Flags:
     """Find the values that are far from those of the frames beside them.
 
     Parameters
@@ -273,6 +271,8 @@ def gross_outliers(values: Floats, variances: Floats) -> Flags:
         In order, without gaps.
     variances : ndarray of float, shape (N,)
         The square of each frame's own standard error.
+    unit : float
+        Of the quantity.
 
     Returns
     -------
@@ -286,7 +286,8 @@ def gross_outliers(values: Floats, variances: Floats) -> Flags:
         scale = 1.0  # that of their own errors
     if not scale > 0 or not math.isfinite(scale):
         return np.zeros(len(values), dtype=bool)
-    return np.asarray(standardised > TUNING.gross * scale)
+    least = TUNING.sway * unit if len(values) < TUNING.fewest else 0.0
+    return np.asarray((standardised > TUNING.gross * scale) & (residuals > least))
 
 
 def _off_neighbours(values: Floats) -> Floats:
