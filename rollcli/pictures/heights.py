@@ -93,7 +93,7 @@ class FittedRoad:
         theta, pitch = math.radians(row.map_roll_deg), math.radians(row.pitch_deg or 0.0)
         ahead, aspect = None, 1.0
         if calibration is not None and row.pitch_deg is not None:
-            aspect = calibration.fy / calibration.fx
+            aspect = calibration.aspect
             if row.image_roll_deg is None:
                 theta = math.atan2(math.sin(theta) * aspect, math.cos(theta))
             ahead = column_ahead(theta, (calibration.cx, calibration.cy), (row.height - 1) / 2, aspect)
@@ -326,7 +326,7 @@ class _Profile:
         if calibration is None:
             return np.where(known, gap * np.float32(self.rise) / d, np.float32(np.nan))
         # |q| of the planes that touch the road, by their rise, 1/m
-        aspect = calibration.fy / calibration.fx
+        aspect = calibration.aspect
         along = calibration.cy * cosine - calibration.cx * sine - self.row
         ahead = d * rest / rise - foot + np.float32(along)
         tilt = side / rise * np.float32(camber * road.middle_rise)

@@ -91,6 +91,11 @@ class Calibration:
     source: str = "calibration"
     notes: tuple[str, ...] = ()
 
+    @property
+    def aspect(self) -> float:
+        """The ratio fy / fx, 1 where pixels are square."""
+        return self.fy / self.fx
+
     def __post_init__(self) -> None:
         for name, value in (("fx", self.fx), ("fy", self.fy)):
             self._require(f"a focal length {name}", value, *_FOCAL, "px")
@@ -209,8 +214,8 @@ def request_with(calibration: Calibration | None, request: Request) -> Request:
     """Return a request for a map that this is the calibration of; as it is where there is none."""
     if calibration is None:
         return request
-    middle, aspect = (calibration.cx, calibration.cy), calibration.fy / calibration.fx
-    return replace(request, middle=middle, doffs=calibration.doffs, aspect=aspect)
+    middle = calibration.cx, calibration.cy
+    return replace(request, middle=middle, doffs=calibration.doffs, aspect=calibration.aspect)
 
 
 def require_calibration(calibration: object) -> None:

@@ -106,7 +106,7 @@ def with_pose(estimate: RollEstimate, calibration: Calibration) -> RollEstimate:
         return replace(estimate, message="; ".join(filter(None, [estimate.message, why])))
     pose = pose_of(tangent, calibration)
     pitch_ci95, height_ci95 = _half_widths(tangent, calibration, pose)
-    turns = rig_turns(tangent.theta, calibration.fy / calibration.fx)
+    turns = rig_turns(tangent.theta, calibration.aspect)
     # a place beside the lane is nearer by the pitch, and where the estimate knew of no other fy than fx
     nearer = math.cos(pose.pitch) * turns / rig_turns(tangent.theta, tangent.grid.aspect)
     return replace(
