@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import UsageError
+from rollcli.errors import InputError, UsageError, about
 from rollcli.files.formats import Stored, read_stored
 from rollcli.rig.calibration import Calibration, require_calibration
 
@@ -37,6 +37,7 @@ _SCALE = {
 _METRES = {"f": 1.0, "i": 1e-3, "u": 1e-3}  # a stored depth, by its kind: metres, or whole millimetres
 _AUTO = {np.dtype(np.uint16): Encoding.KITTI, np.dtype(np.int16): Encoding.SGBM}
 _WHOLE_PIXELS_BELOW = 512
+HEIGHTS = "height over the road"  # begins what a file of heights says of its numbers
 
 
 @dataclass(frozen=True)
@@ -85,9 +86,13 @@ def to_disparity(
 
     Raises
     ------
+    InputError
+        These are heights that rollcli wrote.
     UsageError
         Unknown encoding, a scale of 0, a negative one for unsigned numbers, or a calibration of another view.
     """
+    if stored.text.startswith(HEIGHTS):
+        raise InputError("holds heights over the road: give the disparity map that they were measured in")
     used = resolve_encoding(encoding, stored.values.dtype, scale)
     factor = scale
     if factor is None:
@@ -161,7 +166,8 @@ def read_disparity(
     values = () if invalid is None else (invalid,)
     require_calibration(calibration)
     stored = read_stored(os.fspath(path), rgb=encoding == Encoding.FOUNDATIONSTEREO)
-    found = to_disparity(stored, encoding=encoding, scale=scale, invalid=values, calibration=calibration)
+    with about(os.fspath(path)):
+        found = to_disparity(stored, encoding=encoding, scale=scale, invalid=values, calibration=calibration)
     return found.disparity
 
 

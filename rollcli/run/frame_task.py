@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError
 from rollcli.estimator.estimate import RollEstimate, estimate_roll
 from rollcli.files.codecs.png import encode_png
-from rollcli.files.encodings import KITTI_TOP, Encoding, to_kitti
+from rollcli.files.encodings import HEIGHTS, KITTI_TOP, Encoding, to_kitti
 from rollcli.files.formats import encode_stored
 from rollcli.files.results import Row
 from rollcli.files.storage import noting
@@ -210,7 +210,7 @@ def encode_computed(path: str, disparity: NDArray[Any], save_as: str, text: str 
 def encode_heights(heights: NDArray[np.float32], save_as: str, unit: str) -> bytes:
     """Encode heights over the road as a float32 TIFF, which names their unit, or NPY."""
     form = "npy" if save_as == "npy" else "tiff"
-    return encode_stored(heights, form, text=f"height over the road, {unit}")
+    return encode_stored(heights, form, text=f"{HEIGHTS}, {unit}")
 
 
 def _rotated(source: Source, of: Frame, options: DerotateOptions, paths: Mapping[str, str]) -> _Files:

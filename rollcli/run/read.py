@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from rollcli.errors import EstimationError, InputError, UsageError, raised_at
+from rollcli.errors import EstimationError, InputError, UsageError, about, raised_at
 from rollcli.estimator.estimate import RollEstimate
 from rollcli.estimator.request import Request
 from rollcli.estimator.road.find import Plane, road_plane
@@ -245,7 +245,8 @@ def _read(frame: Frame, options: FramesOptions) -> Source:
     stored, given = read_map(frame, options), options.encoding
     if given.scale is None or given.scale > 0:
         require_positive(stored, frame.file)
-    found = to_disparity(stored, **given._asdict(), calibration=frame.calibration)
+    with about(frame.file):
+        found = to_disparity(stored, **given._asdict(), calibration=frame.calibration)
     encoding = found.encoding.value
     beyond = {"beyond": too_large(found.disparity, stored, encoding)}
     warnings = {**found.warnings, **beyond}

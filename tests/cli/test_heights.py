@@ -29,16 +29,14 @@ def test_heights_of_true_maps_are_true(rendered):
         heights, truth = (tifffile.imread(rendered / part / name) for part in ("out", "heights"))
         assert heights.dtype == np.float32
         known = np.isfinite(truth) & np.isfinite(heights)
-        off = np.abs(heights - truth)[known]
-        assert np.median(off) < 0.002
+        assert np.median(np.abs(heights - truth)[known]) < 0.002
         kerb = known & (np.abs(truth - 0.1) < 1e-4)
         assert np.median(heights[kerb]) == pytest.approx(0.1, abs=0.005)
 
 
 def test_accuracy_compares_heights_where_truth_has_them(rendered):
     arguments = ("evaluate", "accuracy", "rolls.csv", "--truth", "truth.csv", "--format", "csv")
-    done = rollcli(*arguments, cwd=rendered, status=0)
-    (figures,) = rows_of(done.out)
+    (figures,) = rows_of(rollcli(*arguments, cwd=rendered, status=0).out)
     assert figures["over_road_at_5_m_frames"] == figures["over_road_at_10_m_frames"] == "2"
     depth_at = {}
     for name in ("frame_0001", "frame_0002"):
@@ -104,3 +102,6 @@ def test_the_unit_stands_in_the_file_and_npy_is_written_if_asked_for(tmp_path):
     assert np.array_equal(*both, equal_nan=True)
     told = rollcli("heights", "maps/day", "--from", "3.csv", "-o", "again", cwd=tmp_path).err
     assert "was made with a calibration: give it with --calib" in told
+    # below a road heights are negative, which no disparity is
+    told = rollcli("derotate", "h/day", "--roll", "1", "-o", "turned", cwd=tmp_path, status=3).err
+    assert "a.tif: holds heights over the road: give the disparity map" in told
