@@ -354,13 +354,15 @@ def _jumps(rig: RigAssessment, drive: DriveAssessment, limit: float) -> Iterator
         yield _limited(what, drive.change, limit)
     for jump in found.jumps:
         yield _limited(f"jump at {frame_name(rig, drive, jump.frame)}", jump.change, limit)
-    used = found.series.values[found.series.used]
-    told = found.now.ci95 is not None and (found.searched or np.ptp(used) <= limit)
-    if not found.jumps and not told:
-        yield None, f"the jumps of {_frames(rig, drive)}: {too_few(found)}"
-    elif not found.jumps:
-        ends = f" {found.from_ends} frames or more from their ends" if found.searched else ""
-        yield True, f"{_frames(rig, drive)} hold no jump{ends}"
+    if found.jumps:
+        return
+    frames, settled = _frames(rig, drive), found.now.ci95 is not None
+    if settled and found.searched:
+        yield True, f"{frames} hold no jump {found.from_ends} frames or more from their ends"
+    elif settled and (spread := np.ptp(found.series.values[found.series.used])) <= limit:
+        yield True, f"the rolls of {frames} spread over {spread:.2f}°, at most {limit:g}°"
+    else:
+        yield None, f"the jumps of {frames}: {too_few(found)}"
 
 
 def _limited(what: str, found: Estimate, limit: float, why: str = "too few frames") -> _Told:
