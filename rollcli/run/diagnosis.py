@@ -35,6 +35,7 @@ REMEDIES = {
 }
 # rows alone would mirror what a camera saw that hung, and its roll would have the other sign
 _UPSIDE_DOWN = "upside down: reverse the order of its rows; if the camera hung, that of its columns, too"
+_HUNG = "looks upside down, as from a rig that hung: turn both views by half a turn, and swap them"
 
 
 @dataclass(frozen=True)
@@ -155,12 +156,12 @@ def looks_like(
     python : bool
         Whether the words are for a caller in Python.
     """
-    if stored is None:
-        return ""
-    if _is_photograph(stored.values):
+    if stored is not None and _is_photograph(stored.values):
         return f"looks like a photograph, not a disparity map: {REMEDIES['photograph'][python]}"
     if _grows_downward(disparity):
         return ""
+    if stored is None:
+        return _HUNG if _has_road(disparity[::-1, ::-1], options) else ""
     depth = options.encoding.encoding != Encoding.DEPTH
     if depth:
         inverse = np.divide(1, disparity, out=np.zeros_like(disparity), where=disparity > 0)

@@ -4,12 +4,12 @@ import math
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError, as_usage
-from rollcli.estimator import estimate as estimator
 from rollcli.estimator.estimate import RollEstimate
 from rollcli.estimator.moments import map_of, usable_of
 from rollcli.estimator.request import DEFAULT_REQUEST, LearningRate, Request
@@ -202,9 +202,12 @@ def estimate_pair(
     source = matched_source((left, right), stereo or StereoOptions(), road_finder(allowed, request), rig)
     rig = source.calibrated(rig)
     request = request_with(rig, replace(request, slope_error=source.slope_error))
+    like = partial(looks_like, source.disparity, None, FramesOptions(method=MethodOptions(seed=seed)))
     with source.doubting():
-        estimate = estimator.estimate_roll(source.disparity, request, mask=allowed, road_mask=road_mask)
-    estimate = source.doubted(estimate)
+        estimate, likeness = estimate_or_liken(
+            source.disparity, request, like, mask=allowed, road_mask=road_mask
+        )
+    estimate = source.doubted(estimate, likeness)
     return estimate if rig is None else with_pose(estimate, rig)
 
 

@@ -45,6 +45,17 @@ def rows_of_pair_and_map(folder, *given, form="png", axis=(), **how):
     return [row_of(folder, *inputs, *axis, **how) for inputs in ((*VIEWS, *given), (form,))]
 
 
+def test_views_of_a_rig_that_hung_are_told(pair, tmp_path):
+    """Its left camera saw from the right, and all upside down."""
+    hung = pair[2][::-1, ::-1], pair[1][::-1, ::-1]
+    write_views(tmp_path, "a.png", *hung)
+    told = row_of(tmp_path, *VIEWS, calib=())["message"]
+    assert told.startswith(
+        "looks upside down, as from a rig that hung: turn both views by half a turn, and swap"
+    )
+    assert package.estimate_pair(*hung).message == told
+
+
 @pytest.mark.parametrize("form", ["png", "tiff"])
 def test_a_pair_and_its_map_give_the_same_row(pair, form):
     of_pair, of_map = rows_of_pair_and_map(pair[0], form=form)
