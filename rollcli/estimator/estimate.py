@@ -10,7 +10,7 @@ from rollcli.estimator.doubts import doubts_of
 from rollcli.estimator.interval import Tangent, interval_of, jackknife, touch
 from rollcli.estimator.moments import Bools, CheckedMap, Grid
 from rollcli.estimator.request import AREAS, DEFAULT_REQUEST, SOLVERS, Request
-from rollcli.estimator.road.model import Parabola
+from rollcli.estimator.road.model import Parabola, rig_turns
 from rollcli.estimator.road.pixels import PixelSet, select_pixels
 from rollcli.estimator.solvers.exact import CertifiedSolution, certify
 
@@ -196,7 +196,8 @@ def estimate_roll(
     grid = Grid.of_shape(height, width, request.middle, request.aspect)
     tangent = touch(alpha, theta, grid, surface, knife)
     turned = math.hypot(tangent.turned_by(request.slope_error), certified.off)
-    interval = None if knife is None else interval_of(knife, theta, turned, tuning.interval)
+    turns = rig_turns(theta, request.aspect)
+    interval = None if knife is None else interval_of(knife, theta, turned, tuning.interval, turns)
     doubts, notes = list(doubts_of(checked, pixels, certified, interval, request)), []
     if certified.replaced is not None:
         replaced = math.degrees(certified.replaced)

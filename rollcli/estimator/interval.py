@@ -91,7 +91,9 @@ class Interval:
     half_width: float
 
 
-def interval_of(jackknife: Jackknife, theta: float, turned: float, tuning: IntervalTuning) -> Interval:
+def interval_of(
+    jackknife: Jackknife, theta: float, turned: float, tuning: IntervalTuning, turns: float = 1.0
+) -> Interval:
     """Return the 95 % interval of the roll angle.
 
     Parameters
@@ -103,10 +105,11 @@ def interval_of(jackknife: Jackknife, theta: float, turned: float, tuning: Inter
         Standard deviation of an error that all pixels share, radians: by which the map itself is turned, and
         the solver stopped beside the minimum.
     tuning : IntervalTuning
+    turns : float
+        See `rig_turns`: what the ground's own angles differ by turns the rig, and the map by so much less.
     """
-    noise = tuning.factor * jackknife.noise(theta, tuning)
-    uneven, bend = tuning.uneven * jackknife.uneven, tuning.bend * jackknife.bend
-    hidden = tuning.twist * jackknife.hidden
+    noise, bend = tuning.factor * jackknife.noise(theta, tuning), tuning.bend * jackknife.bend
+    uneven, hidden = tuning.uneven * jackknife.uneven / turns, tuning.twist * jackknife.hidden / turns
     half_width = math.hypot(noise, uneven, bend, hidden, _NORMAL * turned)
     return Interval(min(noise, math.pi / 2), min(half_width, math.pi / 2))
 

@@ -26,11 +26,8 @@ def random_rig(rng, *, square=True):
     fx = rng.uniform(150, 400)
     fy = fx if square else fx * rng.uniform(0.97, 1.03)
     centre = rng.uniform(-30, 30, 2) + np.array([WIDTH, HEIGHT]) / 2
-    calibration = Calibration(
-        fx, fy, *map(float, centre), float(rng.uniform(0.1, 0.8)), float(rng.uniform(-5, 5))
-    )
-    roll, pitch, height = rng.uniform(-0.4, 0.4), rng.uniform(-0.1, 0.3), rng.uniform(0.5, 3)
-    return calibration, float(roll), float(pitch), float(height)
+    calibration = Calibration(fx, fy, *centre.tolist(), rng.uniform(0.1, 0.8), rng.uniform(-5, 5))
+    return calibration, rng.uniform(-0.4, 0.4), rng.uniform(-0.1, 0.3), rng.uniform(0.5, 3)
 
 
 def plane_tangent(disparity):
@@ -107,6 +104,14 @@ def test_the_intervals_hold_the_truth(case, least):
     assert (held >= least).all()
 
 
+@pytest.mark.parametrize(("down", "right"), [(1, 2), (2, 1)])
+def test_the_interval_on_uneven_ground_is_the_same_whatever_the_shape_of_pixels(down, right):
+    disparity, rig, _ = rough_lane(np.random.default_rng(0))
+    fewer = Calibration(rig.fx / right, rig.fy / down, rig.cx / right, rig.cy / down, rig.baseline)
+    found = rollcli.estimate_roll(disparity[::down, ::right], calibration=fewer)
+    assert found.ci95 == pytest.approx(rollcli.estimate_roll(disparity, calibration=rig).ci95, rel=0.3)
+
+
 @pytest.mark.parametrize("curvature", [-0.001, 0.001])
 def test_on_a_bent_road_the_pose_is_that_over_the_road_where_the_tangent_touches_it(curvature):
     calibration = Calibration(720.0, 720.0, 620.0, 170.0, 0.54)
@@ -138,8 +143,7 @@ def posed_street(name, downscale=1.0):
     """A real street with the calibration that KITTI publishes for it."""
     left, right = (cv2.imread(str(STREETS / side / f"{name}.png"), -1) for side in ("left", "right"))
     disparity = match_pair(left, right, StereoOptions(downscale=downscale)).disparity
-    calibration = KITTIS.for_size(*left.shape[::-1])
-    return with_pose(estimate_roll(disparity), calibration)
+    return with_pose(estimate_roll(disparity), KITTIS.for_size(*left.shape[::-1]))
 
 
 @pytest.mark.slow
