@@ -264,7 +264,9 @@ def correction_text(health: Health | None, rows: DriveRows | None, results: Sequ
     if health is None:
         raise UsageError(f"{results[0]}: no pair was measured, so there is no correction to write")
     width, height = health.size
-    axis, about = health.axis, _MIDDLE if health.calibration is None else "the principal point"
+    axis, about, aspect = health.axis, _MIDDLE, 1.0
+    if health.calibration is not None:
+        about, aspect = "the principal point", health.calibration.aspect
     lies = health.misalignment
     larger = lies.scale
     if rows is not None:
@@ -274,7 +276,7 @@ def correction_text(health: Health | None, rows: DriveRows | None, results: Sequ
         "width": width,
         "height": height,
         **({} if rows is None else rows.as_text(height, width)),
-        "matrix": lies.matrix(height, width, larger, axis),
+        "matrix": lies.matrix(height, width, larger, axis, aspect),
         "opencv": _CALL,
         "note": f"matrix, for views of {width}x{height} px: from a pixel of the corrected right view to "
         f"the given one, without twist and bend, which no matrix holds, about {about}; {NOT_SEEN}",

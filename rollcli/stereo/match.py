@@ -309,11 +309,14 @@ def match_pair(
     else:
         found = _match_as_told(match, small, told, check=options.checks_alignment)
     (pair, end_fraction), corrected = tried[-1], found.corrected
-    support = found.support(_axis(rig, given[0].shape, options.downscale), height)
+    axis = _axis(rig, given[0].shape, options.downscale)
+    support = found.support(axis, height)
     lies = found.left_to_refine(small.shape)
+    # levelling takes pixels for square: of others, a turn is less or more in the columns than in the rows
+    skew = 0.0 if rig is None else corrected.rotation * (1 - rig.aspect**-2)
 
     def finished(disparity: Map) -> Map:
-        return _with_believed_columns(refined(disparity, views, lies), corrected, support)
+        return _with_believed_columns(refined(disparity, views, lies), corrected, support, (skew, axis[1]))
 
     disparity = finished(found.disparity)
     return StereoMatch(
@@ -469,7 +472,9 @@ def _share_at_end(disparity: Map, pair: Levelled) -> float:
     return float(np.count_nonzero(at_end) / valid) if valid else 0.0
 
 
-def _with_believed_columns(disparity: Map, matched: Misalignment, support: ColumnSupport) -> Map:
+def _with_believed_columns(
+    disparity: Map, matched: Misalignment, support: ColumnSupport, skewed: tuple[float, float]
+) -> Map:
     """Return the map of a pair whose columns lie as is believed.
 
     Views are warped by all that their rows show, for the match needs rows that agree. A scale of the rows is
@@ -485,8 +490,12 @@ def _with_believed_columns(disparity: Map, matched: Misalignment, support: Colum
         Pixels of this size.
     support : ColumnSupport
         What is in the columns.
+    skewed : tuple of float
+        By how many px too much each row was moved along than the one above, where pixels are not square; and
+        the row that was moved rightly, px from the middle.
     """
-    if matched == LEVEL or (support == NO_SUPPORT and not matched.scale):
+    skew, below = skewed
+    if matched == LEVEL or (support == NO_SUPPORT and not matched.scale and not skew):
         return disparity
     height, width = disparity.shape
     u = np.arange(width, dtype=np.float32) - np.float32((width - 1) / 2)
@@ -496,6 +505,8 @@ def _with_believed_columns(disparity: Map, matched: Misalignment, support: Colum
     moved += np.float32(support.pitch) * v + np.float32(support.scale - matched.scale)
     moved *= x
     moved += disparity
+    if skew:
+        moved += np.float32(skew) * (v - np.float32(below))
     np.maximum(moved, np.float32(1e-3), out=moved)
     moved *= disparity > 0
     return moved

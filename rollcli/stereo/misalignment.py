@@ -116,7 +116,9 @@ class Misalignment:
         lower, clockwise, larger, twist = values
         return Misalignment(lower, math.radians(clockwise), larger / 100, twist / (height * width / 4))
 
-    def matrix(self, height: int, width: int, larger: float, axis: tuple[float, float]) -> list[list[float]]:
+    def matrix(
+        self, height: int, width: int, larger: float, axis: tuple[float, float], aspect: float = 1.0
+    ) -> list[list[float]]:
         """Return the affine map from pixels (u, v, 1) of a level view to the given one, without twist.
 
         Parameters
@@ -127,12 +129,14 @@ class Misalignment:
             The scale of the columns.
         axis : tuple of float
             What keeps its column, px from the middle: the right view's principal point.
+        aspect : float
+            fy / fx.
         """
         x, y = (width - 1) / 2, (height - 1) / 2
         across, down = 1 + larger, 1 + self.scale
-        kept = (1 - across) * axis[0] + self.rotation * axis[1]
+        turned = self.rotation / aspect**2  # in the columns, where that is in the rows
         return [
-            [across, -self.rotation, x - across * x + self.rotation * y + kept],
+            [across, -turned, x - across * x + turned * y + (1 - across) * axis[0] + turned * axis[1]],
             [self.rotation, down, y + self.offset - self.rotation * x - down * y],
             [0.0, 0.0, 1.0],
         ]

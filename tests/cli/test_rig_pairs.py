@@ -164,7 +164,7 @@ def test_the_matrix_brings_the_right_view_back(pairs):
 
 
 def test_the_matrix_enlarges_columns_as_is_believed_and_keeps_that_of_the_principal_point(pairs):
-    sized = "cam0=[336 0 259.5; 0 336 159.5; 0 0 1]\nbaseline=540\nwidth=480\nheight=360\n"
+    sized = "cam0=[336 0 259.5; 0 168 159.5; 0 0 1]\nbaseline=540\nwidth=480\nheight=360\n"
     (pairs / "off_middle.txt").write_text(sized)
     asked = ("--calib", "off_middle.txt", "--correction", "axis.json", "--overwrite", "-q")
     assert rollcli("rig", "off.csv", *asked, cwd=pairs).status == 0
@@ -172,6 +172,7 @@ def test_the_matrix_enlarges_columns_as_is_believed_and_keeps_that_of_the_princi
     matrix = np.array(found["matrix"])
     assert (matrix @ [259.5, 159.5, 1.0])[0] == pytest.approx(259.5)
     assert matrix[0, 0] - 1 == pytest.approx(found["columns"]["scale"], abs=1e-6)
+    assert matrix[0, 1] == pytest.approx(-4 * matrix[1, 0])  # fx = 2 fy
     assert matrix[1, 1] - 1 == pytest.approx(found["right_larger_percent"] / 100, abs=1e-5)
 
 

@@ -135,6 +135,16 @@ def test_a_map_of_a_pair_whose_right_camera_is_rolled_has_the_pitch_of_its_pair(
     assert float(of_map["pitch_deg"]) == pytest.approx(float(of_pair["pitch_deg"]), abs=0.005)
 
 
+@pytest.mark.slow
+def test_a_right_camera_that_is_rolled_turns_no_road_where_pixels_are_not_square():
+    spec = FrameSpec("open", roll=0.2, pitch=0.07, principal_point=(319.5, 200.0), seed=12, colour=False)
+    views = (each[::2] for each in (render_frame(spec).left, seen_rolled(spec, 1.0)))
+    calibration = Calibration(spec.focal, spec.focal / 2, 319.5, 100.0, spec.baseline)
+    found = package.estimate_pair(*views, calibration=calibration)
+    pose = spec.roll, spec.pitch, spec.height
+    assert (found.theta, found.pitch, found.height_m) == pytest.approx(pose, abs=0.002)
+
+
 def test_a_pair_that_was_measured_and_not_levelled_has_the_calibration_as_it_is():
     calibration = Calibration(300.0, 300.0, 160.0, 60.0, 0.5, 1.5)
     known = {"disparity": np.ones((240, 320)), "alignment": {"right_clockwise_deg": 0.01}}
