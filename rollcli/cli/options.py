@@ -54,8 +54,9 @@ _LEARNS = Needs(lambda ctx: ctx.params["method"] == "gd", "only --method gd has 
 _ITERATES = Needs(
     lambda ctx: ctx.params["method"] not in AREAS, "--method {method} does not iterate on the angle"
 )
+_FINDS = Needs(lambda ctx: ctx.params["road"] != "all", "--road all looks for no road")
 _SEARCHES = Needs(  # areas chooses among its planes by their roll
-    lambda ctx: ctx.params["road"] != "all" or ctx.params["method"] == "areas", "--road all looks for no road"
+    lambda ctx: _FINDS.holds(ctx) or ctx.params["method"] == "areas", _FINDS.reason
 )
 _PREVIEW = Needs(
     lambda ctx: any(ctx.params.get(each) for each in ("preview", "heights_preview")),
@@ -142,7 +143,7 @@ method_options = Section("method", "Method", records.MethodOptions).of(
     option("--tolerance", Number("DEG", above=0, at_most=90), _ITERATES),
     option("--max-roll", Number("DEG", above=0, at_most=MAX_ROLL_LIMIT_DEG), _SEARCHES),
     option("--max-interval", Number("DEG", above=0, at_most=90)),
-    option("--seed", Number("INT", at_least=0, whole=True)),
+    option("--seed", Number("INT", at_least=0, whole=True), _FINDS),
 )
 
 
