@@ -14,6 +14,7 @@ from rollcli.extras import require_extra
 from rollcli.files.inputs import is_elsewhere, match_paths
 from rollcli.files.naming import listed
 from rollcli.files.results import Row, read_result, run_path
+from rollcli.messages import counted
 from rollcli.run import outputs
 from rollcli.run.batch import work_on, workers_for
 from rollcli.run.find import calibration_files, check_depth, check_first_size, find_frames, mask_finder
@@ -190,6 +191,7 @@ def _tell_suspects(rows: Sequence[Row], options: ConvertOptions) -> None:
     if skips and suspects == len(rows):
         raise UsageError(f"{options.result}: every angle is suspect: --skip-suspect leaves out all maps")
     if suspects:
-        are = "is" if suspects == 1 else "are"
-        done = "; such maps are left out" if skips else " and used; --skip-suspect leaves such maps out"
-        options.running.note(f"{options.result}: {suspects} of {len(rows)} angles {are} suspect{done}")
+        of, are = counted(len(rows), "angle"), "is" if suspects == 1 else "are"
+        remedy = "" if isinstance(options, VDisparityOptions) else "; --skip-suspect leaves such maps out"
+        done = "; such maps are left out" if skips else f" and used{remedy}"
+        options.running.note(f"{options.result}: {suspects:,} of {of} {are} suspect{done}")
