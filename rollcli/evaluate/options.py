@@ -52,6 +52,8 @@ class PaperOptions(FramesOptions):
         Write each chart of the page as a figure, too, as wide as a journal's column (3.5 inches).
     """
 
+    calibrates = False
+
     output: str
     turns: tuple[float, float, float] = (-20.0, 20.0, 2.0)
     timed: int = 3

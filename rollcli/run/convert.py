@@ -67,7 +67,7 @@ def _plan(options: ConvertOptions) -> list[Frame]:
     """Find the frames, give each its row, and check what can be checked before they run."""
     _check_options(options)
     frames = find_frames(options)
-    if not isinstance(options, DerotateOptions):
+    if options.calibrates:
         check_depth(frames, options)
     rows = _find_rows(frames, options)
     check_first_size(frames, options)

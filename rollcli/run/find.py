@@ -437,7 +437,8 @@ def _in_bags(bags: "Bags", options: FramesOptions) -> Iterator[_Named]:
     bags, rests = readable_bags(bags)
     for bag in [frames_of_bag(files, name, options.inputs.topic, *options.topics) for name, files in bags]:
         known, given = bag.calibration, options.calibration
-        options.running.note(*bag.notes, *([] if given.given else bag.uncalibrated))
+        lacks = [] if given.given or not options.calibrates else bag.uncalibrated
+        options.running.note(*bag.notes, *lacks)
         known = None if known is None or given.calib else with_numbers(known, given)
         yield from ((*views, known) for views in bag.frames)
     yield from ((rest, rest if options.paired else None, None) for rest in rests)

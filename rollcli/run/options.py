@@ -7,7 +7,7 @@ import math
 import posixpath
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, TypeVar
+from typing import Any, ClassVar, Literal, NamedTuple, TypeVar
 
 from rollcli.estimator.request import (
     LAMBDA0,
@@ -388,6 +388,8 @@ class FramesOptions:
     object, is read anew by each. `notes` tells whether workers say what each frame was read from.
     """
 
+    calibrates: ClassVar[bool] = True  # whether it has use of a calibration
+
     inputs: InputOptions = field(default_factory=InputOptions)
     running: RunningOptions = field(default_factory=RunningOptions)
     pairs: PairOptions = field(default_factory=PairOptions)
@@ -487,6 +489,8 @@ class DerotateOptions(ConvertOptions):
     skip_suspect : bool
         With --from, leave out the maps whose angle is suspect.
     """
+
+    calibrates = False
 
     roll_deg: float | None = None
     expand: bool = False
