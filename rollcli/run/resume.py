@@ -21,6 +21,7 @@ from rollcli.files import results
 from rollcli.files.locking import differences, not_resumable
 from rollcli.files.storage import write_bytes
 from rollcli.files.stores.locations import base_name, public_name
+from rollcli.messages import counted
 from rollcli.rig.calibration import Calibration
 from rollcli.run import outputs
 from rollcli.run.batch import Step, check_owned
@@ -503,7 +504,8 @@ def _differences(kept: KeptRows, was: Mapping[str, Any] | None, record: RunRecor
     if kept.mismatch:
         yield f"the inputs differ: {kept.mismatch}{hint}"
     if kept.count > len(frames):
-        yield f"it has {kept.count} rows, and there are {len(frames)} frames{hint}"
+        there = f"there {'is' if len(frames) == 1 else 'are'} {counted(len(frames), 'frame')}"
+        yield f"it has {counted(kept.count, 'row')}, and {there}{hint}"
     inputs_was, inputs_now = was["inputs"], now["inputs"]
     if inputs_was.get("frames") != inputs_now["frames"]:
         yield f"it was begun with {inputs_was.get('frames')} frames, now there are {inputs_now['frames']}"

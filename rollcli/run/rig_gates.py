@@ -387,7 +387,8 @@ def _share(rig: RigAssessment, least: float) -> _Told:
     ok = int(rig.frames.ok.sum())
     share = ok / rig.count if rig.count else 0.0
     of = f" of {rig.frames.origins[0]}" if len(set(rig.frames.origins)) == 1 else ""
-    message = f"{ok:,} of {rig.count:,} frames{of} are ok, {100 * share:.4g} %"
+    frames, are = counted(rig.count, "frame"), "is" if rig.count == 1 else "are"
+    message = f"{ok:,} of {frames}{of} {are} ok, {100 * share:.4g} %"
     if rig.count and share >= least:
         return True, message
     others = [rig.names[place] for place in np.flatnonzero(~rig.frames.ok).tolist()]
