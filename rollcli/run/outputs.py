@@ -211,11 +211,18 @@ def listed_only(
     ------
     UsageError
         Names an input that would be written, or without --overwrite an output that exists.
+    OutputError
+        Names an output below what is no folder.
     """
     written = [path for _, writes in files() for path in writes]
     check_inputs_are_kept(lambda: chain.from_iterable(reads for reads, _ in files()), written)
     if not running.overwrite:
         check_nothing_is_there(written)
+    # a file of each folder, before any work: what is written last would leave the others behind
+    for folder, path in {os.path.split(each)[0]: each for each in written[::-1] if not is_url(each)}.items():
+        above = next(filter(os.path.lexists, (folder, *map(str, Path(folder).parents))), "")
+        if above and not is_folder(above):
+            raise OutputError(f"{path}: cannot be written: {above} is no folder")
     if running.dry_run:
         list_files(files())
     return running.dry_run
