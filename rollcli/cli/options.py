@@ -42,6 +42,9 @@ _BASELINE = Needs(
     lambda ctx: ctx.command.name not in ("vdisparity", "disparity") or ctx.params.get("encoding") == "depth",
     "horizon and levelling do not depend on it; only depth maps need it",
 )
+_OFFSET = Needs(
+    lambda ctx: ctx.params.get("encoding") != "depth" or _has_pairs(ctx), "depths do not depend on it"
+)
 _STAMPS = Needs(lambda ctx: ctx.params["left_topic"], "only views of a bag are paired by their stamps")
 _MEASURED = Needs(
     lambda ctx: ctx.params["vertical_offset"] is None, "--vertical-offset says how the right image lies"
@@ -186,5 +189,5 @@ calibration_options = Section(
     option("--focal", Number("PX", above=0)),
     option("--principal-point", POINT),
     option("--baseline", Number("M", above=0), _BASELINE),
-    option("--doffs", Number("PX")),
+    option("--doffs", Number("PX"), _OFFSET),
 )
