@@ -174,8 +174,11 @@ def differences(was: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]
     options_was, options_now = was["options"], json.loads(json.dumps(now["options"]))
     for key in (*options_now, *(key for key in options_was if key not in options_now)):
         if options_was.get(key) != options_now.get(key):
-            yield f"--{key} was {_shown(options_was.get(key))}, is now {_shown(options_now.get(key))}"
+            yield f"--{key} was {given_as(options_was.get(key))}, is now {given_as(options_now.get(key))}"
 
 
-def _shown(value: Any) -> str:
-    return "not given" if value in (None, []) else str(value)
+def given_as(value: Any) -> str:
+    """Say how an option was given, by its value in a record."""
+    if value is True:  # of an option that is given alone
+        return "given"
+    return "not given" if value is False or value in (None, []) else str(value)

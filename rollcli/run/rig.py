@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError
 from rollcli.files import results
+from rollcli.files.locking import given_as
 from rollcli.files.naming import listed, natural_key
 from rollcli.files.storage import STREAM, is_stream, write_output
 from rollcli.files.stores.locations import base_name, is_remote
@@ -128,7 +129,7 @@ def _check_shards(parts: Sequence[Part], shards: Sequence[tuple[int, int]]) -> N
             )
         made = [_made_with(each.run) for each in (first, part)]
         for name in sorted({*made[0], *made[1]}):
-            was, now = ("not given" if each.get(name) is None else each[name] for each in made)
+            was, now = (given_as(each.get(name)) for each in made)
             if was != now:
                 names = f"{first.path} and {part.path}"
                 raise UsageError(f"{names} are not shards of one run: {name} was {was} and {now}")
