@@ -372,10 +372,13 @@ def workers_here():
         yield made
 
 
-def test_a_scheduler_is_named_by_its_file_too(workers_here, tmp_path):
-    file = tmp_path / "scheduler.json"
-    file.write_text(json.dumps({"type": "Scheduler", "address": workers_here.scheduler_address}))
-    check_scheduler(str(file))
+@pytest.mark.parametrize("name", ["scheduler.json", "./scheduler"])
+def test_a_scheduler_is_named_by_its_file_too(workers_here, tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    address = workers_here.scheduler_address
+    (tmp_path / name).write_text(json.dumps({"type": "Scheduler", "address": address}))
+    check_scheduler(name)
+    assert scheduler_address(name) == address
     assert scheduler_address("tcp://far:8786") == "tcp://far:8786"
     assert scheduler_address("far:8786") == "far:8786"
 

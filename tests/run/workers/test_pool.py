@@ -7,17 +7,15 @@ import sys
 import threading
 import time
 from pathlib import Path
-from types import SimpleNamespace
-from unittest.mock import Mock
 
 import pytest
 
-from rollcli.errors import InputError, UsageError, WorkerError
+from rollcli.errors import InputError, WorkerError
 from rollcli.run.workers import pool as pools
 from rollcli.run.workers.chunks import Work, Workers
 from rollcli.run.workers.interrupt import Stop, stop_signals
 from rollcli.run.workers.pool import PoolExecutor
-from rollcli.run.workers.tasks import require_scheduler, run_tasks
+from rollcli.run.workers.tasks import run_tasks
 from tests.run.workers.tasks import lost, run
 from tests.run_cli import ended, environment, wait_until
 from tests.slow import mostly_slow
@@ -154,22 +152,6 @@ def test_when_a_further_worker_cannot_start_the_others_end(monkeypatch):
     assert [worker._process.is_alive() for worker in started] == [False, False]
 
 
-def test_a_system_that_starts_no_process_is_said_with_a_remedy(monkeypatch):
-    fail = Mock(side_effect=OSError(24, "Too many open files"))
-    monkeypatch.setattr(pools.multiprocessing, "get_context", lambda kind: SimpleNamespace(Pipe=fail))
-    with pytest.raises(
-        WorkerError,
-        match=r"^a worker process cannot start: .*Too many open files; try fewer of them, with --jobs$",
-    ):
-        PoolExecutor(2, WORK, Workers())
-
-
-def test_no_scheduler_is_asked_for_unless_one_is_named():
-    require_scheduler(None)
-    with pytest.raises(UsageError, match=r"^--scheduler"):
-        require_scheduler("")
-
-
 HOW_IT_STARTS = """
 import sys, threading
 from rollcli.run.workers.chunks import Work
@@ -194,14 +176,3 @@ def test_a_process_with_one_thread_is_forked_and_one_with_more_is_not(tmp_path):
 
     assert kind() == "ForkProcess\n"
     assert kind("threads") == "SpawnProcess\n"
-
-
-@pytest.mark.parametrize("name", ["scheduler.json", "folder/scheduler"])
-def test_a_scheduler_is_named_by_a_json_file_or_by_a_path(tmp_path, monkeypatch, name):
-    pytest.importorskip("distributed", reason="distributed, of the extra cluster, is not here")
-    from rollcli.run.workers.cluster import scheduler_address
-
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "folder").mkdir()
-    (tmp_path / name).write_text('{"address": "tcp://far:8786"}')
-    assert scheduler_address(name) == "tcp://far:8786"
