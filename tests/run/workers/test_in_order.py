@@ -11,9 +11,8 @@ import pytest
 
 from rollcli.errors import InputError, WorkerDiedError
 from rollcli.run.workers import chunks as chunk_sizes
-from rollcli.run.workers.chunks import Chunk, Done, Work, Workers
+from rollcli.run.workers.chunks import Chunk, Done, Work
 from rollcli.run.workers.interrupt import Stop
-from rollcli.run.workers.tasks import run_tasks
 from tests.run.workers.tasks import in_order
 
 WORK = Work(str, str)
@@ -163,16 +162,6 @@ def test_an_error_of_a_task_reaches_the_caller_after_the_results_before_it():
     assert next(results) == "did"
     with pytest.raises(ValueError, match="1"):
         next(results)
-
-
-def test_this_process_begins_no_task_after_a_stop():
-    stop, begun = Stop(), []
-    work = Work(lambda task: begun.append(task) or task, None)
-    results = run_tasks("abc", work, stop, Workers(1))
-    assert next(results) == "a"
-    stop.asked = True
-    assert list(results) == []
-    assert begun == ["a"]
 
 
 def job_of(do):
