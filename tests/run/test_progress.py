@@ -124,15 +124,6 @@ def test_a_terminal_shows_a_bar_which_makes_room_for_messages_and_vanishes(monke
     os.close(terminal.reader)
 
 
-def test_the_speed_leaves_out_what_an_interrupted_run_has_left(clock):
-    progress = TaskProgress(100, RunningOptions())
-    progress.kept = 50
-    for _ in range(6):
-        clock.now += 0.5
-        progress.advance()
-    assert progress.speed() == "2.0 frames/s"
-
-
 def test_of_more_frames_than_memory_is_meant_for_the_answer_names_who_has_it(monkeypatch):
     monkeypatch.setattr("rollcli.run.progress._MOST_FRAMES", 3)
     found = RunSummary()
