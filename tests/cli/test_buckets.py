@@ -16,18 +16,6 @@ def bucket(bucket, tmp_path):
     return bucket
 
 
-def test_a_result_in_a_bucket_is_kept_resumed_and_replaced_as_asked(bucket, tmp_path):
-    line = ("estimate", f"{bucket}/maps", "-o", f"{bucket}/rolls.csv", "--part-rows", "2", "-q")
-    assert rollcli(*line, cwd=tmp_path).status == 0
-    whole = joined(f"{bucket}/rolls.csv")
-    assert "exists already; give --resume" in rollcli(*line, cwd=tmp_path).refused()
-    remove(f"{bucket}/rolls.csv/part-00001.csv")
-    assert rollcli(*line, "--resume", cwd=tmp_path).status == 0
-    assert joined(f"{bucket}/rolls.csv") == whole
-    assert rollcli(*line, "--overwrite", cwd=tmp_path).status == 0
-    assert joined(f"{bucket}/rolls.csv") == whole
-
-
 @pytest.mark.parametrize("place", ["bucket", "disk"])
 def test_a_folder_of_parts_may_be_named_with_a_slash(bucket, tmp_path, place):
     result = f"{bucket if place == 'bucket' else tmp_path}/rolls.parquet"
