@@ -1,10 +1,8 @@
 """A result is updated to the bytes of a run on the inputs as they are; identical bytes count as unchanged."""
 
-import json
 import os
 from unittest.mock import Mock
 
-import numpy as np
 import pytest
 
 from rollcli.files.storage import read_bytes, remove, write_bytes
@@ -135,28 +133,3 @@ def test_objects_are_compared_by_their_tags(tmp_path, bucket, monkeypatch):
     )
     assert "(3 kept)" in estimate(tmp_path, "--update", **line).err
     assert read == [f"{folder}/frame2.png"]
-
-
-@pytest.mark.parametrize("result", ["rolls.csv", "rolls.jsonl"])
-def test_an_update_that_keeps_no_row_records_how_the_maps_of_now_were_read(tmp_path, result):
-    """Else `rig` would ask of maps that were exported anew whether they are one rig's."""
-    write_maps(tmp_path / "maps", 2)
-    estimate(tmp_path, result=result)
-    for path in sorted((tmp_path / "maps").iterdir()):
-        np.save(path.with_suffix(".npy"), road_map(0.1))
-        path.unlink()
-    estimate(tmp_path, "--update", result=result)
-    assert json.loads((tmp_path / f"{result}.run.json").read_text())["encoding"] == ["px"]
-
-
-@pytest.mark.parametrize("result", mostly_slow(["rolls.csv", "rolls.parquet"], "rolls.csv"))
-def test_frames_that_were_added_amid_or_are_gone_are_told_of_an_update_where_it_is_possible(tmp_path, result):
-    write_maps(tmp_path / "maps", 3)
-    estimate(tmp_path, result=result)
-    put(tmp_path, "frame0a")
-    added = estimate(tmp_path, "--resume", result=result, status=2).err
-    (tmp_path / "maps" / "frame0a.png").unlink()
-    (tmp_path / "maps" / "frame1.png").unlink()
-    gone = estimate(tmp_path, "--resume", result=result, status=2).err
-    taken = estimate(tmp_path, "--update", result=result, status=0 if result == "rolls.csv" else 2)
-    assert ["--update" in said for said in (added, gone)] == [taken.status == 0] * 2
