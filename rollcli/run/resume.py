@@ -105,7 +105,7 @@ class RunRecord:
 
     def continue_from(self, earlier: Mapping[str, Any], kept: "KeptRows") -> None:
         """Take over what the interrupted run has recorded about the inputs of the rows that are kept."""
-        if kept.count > len(kept.again):
+        if kept.summary.frames:
             encodings, searched = frozenset(earlier["encoding"]), tuple(earlier["disparities_searched_px"])
             self.read_as = ReadAs(encodings, searched or None, recorded_downscale(earlier, self.plan.output))
         self.replaces |= earlier.get(_REPLACES) is True
