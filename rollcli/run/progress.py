@@ -125,14 +125,15 @@ class RunSummary:
             return f"more than {_MOST_FRAMES:,} frames: rollcli rig RESULT says what they say of the rig"
         import numpy as np
 
-        from rollcli.rig.drive.assess import assess_rig
+        from rollcli.rig.drive.assess import RigFrames, assess_frames
         from rollcli.rig.words import one_line
 
         order = np.argsort(self._places, kind="stable")
-        files, statuses = [self._files[at] for at in order], [STATUSES[self._status[at]] for at in order]
+        status = np.asarray(self._status)[order]
+        ok, suspect = (status == STATUSES.index(name) for name in ("ok", "suspect"))
         numbers = np.asarray(self._numbers).reshape(-1, len(COLUMNS))[order].T
-        columns = zip(COLUMNS, np.ascontiguousarray(numbers), strict=True)
-        return one_line(assess_rig({"file": files, "status": statuses, **dict(columns)}))
+        columns = dict(zip(COLUMNS, np.ascontiguousarray(numbers), strict=True))
+        return one_line(assess_frames(RigFrames([self._files[at] for at in order], ok, suspect, columns)))
 
     def pose_note(self, calibration: Calibration | None, downscale: float) -> str:
         """Return what the intervals of pitch and height leave out; empty where no frame has a pitch.

@@ -439,4 +439,5 @@ def _floats(values: Sequence[Any]) -> Floats:
 
 
 def _is_blank(value: Any) -> bool:
-    return bool(value is None or type(value).__name__ == "NAType" or value == "")
+    # a number of NumPy takes 8 microseconds to tell that it is no text
+    return value is None or type(value).__name__ == "NAType" or (isinstance(value, str) and not value)
