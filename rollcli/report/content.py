@@ -19,7 +19,7 @@ from rollcli.report.pictures import Pictures
 from rollcli.rig import words
 from rollcli.rig.drive.assess import RigAssessment
 from rollcli.rig.quantities import QUANTITIES
-from rollcli.run.resume import recorded_calibrations, recorded_downscale
+from rollcli.run.resume import recorded_calibrations, recorded_downscale, recorded_encodings
 from rollcli.run.rig_gates import NOT_SEEN, Health, health_of
 
 
@@ -50,7 +50,7 @@ def report_page(
         run=run,
         summary=said.summarize(rows),
         written=max(map(said.written_at, options.results)),
-        encodings=", ".join(map(str, run["encoding"])) if isinstance(run.get("encoding"), list) else "",
+        encodings=", ".join(recorded_encodings(run)),
         charts={name: replace(chart, still=stills(chart)) for name, chart in charts.items()},
         answer=words.answer(rig.now()).replace("-", "−"),
         quantities=QUANTITIES,

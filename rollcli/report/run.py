@@ -57,7 +57,6 @@ def run_report(options: ReportOptions) -> ExitStatus:
         order, origins = order_of(parts)
         owned = [owned[place] for place in order]
     rows = tuple(row for _, row in owned)
-    result = Result(rows, common_run([part.run for part in parts]))
     rig = assess_rig(rows, origins=origins)
     jumps = {
         int(drive.frames[jump.frame])
@@ -73,6 +72,7 @@ def run_report(options: ReportOptions) -> ExitStatus:
     writes = [*(path for name in charts for path in options.chart_paths(name).values()), *page]
     if listed_only(lambda: [([*options.results, *reads], writes)], options.running):
         return ExitStatus.DONE
+    result = Result(rows, common_run([part.run for part in parts]))
     if missing := unfinished(parts):
         options.running.note(missing)
     return _write(options, result, chosen, found, rig, charts)

@@ -14,6 +14,7 @@ from rollcli.rig.drive.assess import drive_of
 from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.quantities import ROLL, Quantity
 from rollcli.rig.words import answer
+from rollcli.run.resume import recorded_encodings
 
 
 def summarize(rows: Sequence[Row]) -> dict[str, Any]:
@@ -63,7 +64,7 @@ def common_run(runs: Sequence[Mapping[str, Any] | None]) -> Mapping[str, Any] | 
     if len(runs) == 1 or None in runs:
         return runs[0] if len(runs) == 1 else None
     known = [each for each in runs if each is not None]
-    encodings = [name for each in known for name in each.get("encoding") or ()]
+    encodings = [name for each in known for name in recorded_encodings(each)]
     options = _in_common([each.get("options", {}) for each in known])
     versions = ", ".join(dict.fromkeys(str(each["rollcli"]) for each in known if each.get("rollcli")))
     found = {**_in_common(known), "options": options, "encoding": list(dict.fromkeys(encodings))}

@@ -198,6 +198,12 @@ def recorded_calibrations(run: Mapping[str, Any] | None) -> list[Calibration]:
         return []
 
 
+def recorded_encodings(run: Mapping[str, Any] | None) -> list[str]:
+    """Read back how maps were read."""
+    found = (run or {}).get("encoding")
+    return list(map(str, found)) if isinstance(found, list) else []
+
+
 def recorded_downscale(run: Mapping[str, Any] | None, name: str) -> float:
     """Read back how much wider than maps their images were."""
     found = (run or {}).get("downscale")
@@ -256,8 +262,8 @@ def recorded_options(run: Mapping[str, Any] | None, name: str) -> FramesOptions:
 
 def _region(given: Mapping[str, Any]) -> RegionOptions:
     mask, roi, polygon = (given.get(name) for name in RegionOptions._fields)
-    if not isinstance(mask, str | None) or (roi is not None and len(roi) != 4):
-        raise TypeError(f"mask is {mask!r}, roi {roi!r}")
+    if not isinstance(mask, str | None) or (roi is not None and len(roi) != 4) or polygon in ([], {}):
+        raise TypeError(f"mask is {mask!r}, roi {roi!r}, polygon {polygon!r}")
     corners = polygon and tuple((float(x), float(y)) for x, y in polygon)
     return RegionOptions(mask, roi and tuple(map(int, roi)), corners)
 
@@ -272,7 +278,8 @@ def _filled(defaults: Options, given: Mapping[str, Any]) -> Options:
             value = tuple(map(float, value))
             if before and len(value) != len(before):
                 raise TypeError(f"{key} is {list(value)!r}")
-        if not isinstance(value, _kinds(name, before)) or isinstance(value, bool):
+        fits = isinstance(value, _kinds(name, before)) or (name, value) == ("lambda0", "auto")
+        if not fits or isinstance(value, bool):
             raise TypeError(f"{key} is {value!r}")
         values[name] = value
     return type(defaults)(**values)
@@ -280,8 +287,6 @@ def _filled(defaults: Options, given: Mapping[str, Any]) -> Options:
 
 def _kinds(name: str, default: Any) -> tuple[type, ...]:
     """List the types that JSON may hold for an option."""
-    if name == "lambda0":
-        return (str, int, float)
     if default is None:
         return (type(None), int, float) if name in _NUMBERS else (type(None), str)
     return {int: (int,), float: (int, float), tuple: (tuple,)}.get(type(default), (str,))

@@ -25,7 +25,7 @@ from rollcli.run.frame import Frame, frame_of_row
 from rollcli.run.options import FramesOptions, RegionOptions, RigOptions
 from rollcli.run.outputs import check_named_once, listed_only
 from rollcli.run.read import FRAME_ERRORS, read_source
-from rollcli.run.resume import recorded_downscale, recorded_options
+from rollcli.run.resume import recorded_downscale, recorded_encodings, recorded_options
 from rollcli.run.rig_gates import check_options, health_of, run_checks, status_of
 from rollcli.run.rig_text import FORMATS, NO_COLUMNS, Findings, correction_text, moves
 from rollcli.stereo.alignment import Measured
@@ -193,8 +193,7 @@ def _notes(parts: Sequence[results.ResultColumns]) -> list[str]:
     notes = [
         f"{path}: has several rows of a frame, {n:,} too many: each counts" for path, n in more.items() if n
     ]
-    encodings = [(part.run or {}).get("encoding") for part in parts]
-    seen = sorted({str(name) for names in encodings if isinstance(names, list) for name in names})
+    seen = sorted({name for part in parts for name in recorded_encodings(part.run)})
     if len(seen) > 1:
         paths = listed(part.path for part in parts)
         notes.append(f"{paths}: maps were read as {', '.join(seen)}: are they one rig's?")
