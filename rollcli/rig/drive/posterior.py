@@ -45,9 +45,9 @@ class SequenceTuning:
         nearer, for two of three are close by chance. Of drives of 3 frames that differ by 0.2
         degrees, 0.13 lost one, and 0.01 do. In 98 % of trials some of 30 drives of one rig, of 5
         frames each, differed without it, and in 3 % with it.
-    least_error : float
-        Smallest own standard error of a frame, in units of the quantity: an interval of nothing must not take
-        all the weight.
+    least_error, most_error : float
+        Smallest and largest own standard error of a frame, in units of the quantity: an interval of nothing
+        must not take all the weight, and one of 1e7 of them made a covariance that has no inverse.
     correlations : tuple of float
         What of the car's and the road's own movement is left in the next cell: 0, and even in log correlation
         time.
@@ -104,6 +104,7 @@ class SequenceTuning:
     neighbours: int = 7
     sway: float = 0.6
     least_error: float = 1e-3
+    most_error: float = 1e4
     correlations: tuple[float, ...] = (
         *(0.0, 0.3, 0.5, 0.65, 0.75, 0.82, 0.87),
         *(0.91, 0.94, 0.96, 0.975, 0.985, 0.993),

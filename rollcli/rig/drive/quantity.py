@@ -255,7 +255,8 @@ def _prepared(values: Floats, errors: Floats, unit: float) -> tuple[Series, int]
     else:
         steps = np.abs(np.diff(values[used]))
         usual = float(np.median(steps)) if len(steps) else 0.0
-    own = np.maximum(np.where(known, errors, usual), TUNING.least_error * unit) ** 2
+    least, most = TUNING.least_error * unit, TUNING.most_error * unit
+    own = np.clip(np.where(known, errors, usual), least, most) ** 2
     gross = np.zeros(len(values), dtype=bool)
     gross[used] = gross_outliers(values[used], own[used], unit)
     kept = used & ~gross

@@ -95,6 +95,7 @@ def test_many_frames_are_averaged_and_the_jump_is_still_found_to_the_frame():
         ([0.5] * 300, [np.nan] * 300),
         ([0.0, 1.0] * 100, [0.1] * 200),
         ([1.0] + [np.nan] * 500 + [2.0], [0.1] * 502),
+        ([1.0, 2.0], [0.05, 1e20]),
     ],
 )
 def test_few_equal_or_missing_values_are_assessed_without_complaint(values, errors):
