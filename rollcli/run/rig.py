@@ -308,7 +308,7 @@ def _pairs(rig: RigAssessment, paths: Sequence[str]) -> Iterator[tuple[Frame, Fr
         return
     parts = [drive.quantities[each.name] for each in ALIGNMENT if each.name in drive.quantities]
     since = drive.frames[max(each.segments[-1].first for each in parts if each.segments) :]
-    told = since[np.isfinite(rig.frames.numbers[ALIGNMENT[0].column][since])]
+    told = since[np.isfinite(rig.frames.column(ALIGNMENT[0].column)[since])]
     if any(each.drifts for each in parts):
         told = told[-_PAIRS:]
     chosen = told[np.linspace(0, len(told) - 1, min(_PAIRS, len(told))).astype(np.intp)]

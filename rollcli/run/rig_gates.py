@@ -176,7 +176,7 @@ def _measured(
     found = [drive.quantities[each.name] for each in ALIGNMENT if each.name in drive.quantities]
     if len(found) < len(ALIGNMENT) or any(each.now.value is None for each in found):
         return None
-    sizes = [rig.frames.numbers.get(name, np.empty(0))[drive.frames] for name in SIZE]
+    sizes = [rig.frames.column(name)[drive.frames] for name in SIZE]
     if any(not np.isfinite(each).any() for each in sizes):
         return None
     width, height = (int(each[np.isfinite(each)][-1]) for each in sizes)

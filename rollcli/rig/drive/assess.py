@@ -140,6 +140,10 @@ class RigFrames:
     numbers: Mapping[str, Floats]
     origins: Sequence[str] = ()
 
+    def column(self, name: str) -> Floats:
+        """Return one of the numbers of each frame; NaN alone where the result has no such column."""
+        return self.numbers.get(name, np.full(len(self.files), np.nan))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DriveAssessment:
@@ -290,12 +294,12 @@ def assess_frames(frames: RigFrames, *, include_suspect: bool = False, groups: s
     measured = frames.ok | frames.suspect  # how the views lie is told where the angle is not, too
     counted = measured if include_suspect else frames.ok
     drives: list[DriveAssessment] = []
-    rolls = np.where(counted, frames.numbers[ROLL.column], np.nan)
+    rolls = np.where(counted, frames.column(ROLL.column), np.nan)
     for name, places in split_drives(frames.files, groups, _kinds(frames), rolls):
         found = {
             quantity.name: _assessed(frames, places, measured if quantity in ALIGNMENT else counted, quantity)
             for quantity in (*QUANTITIES, *ALIGNMENT)
-            if quantity is ROLL or np.isfinite(frames.numbers.get(quantity.column, np.empty(0))).any()
+            if quantity is ROLL or np.isfinite(frames.column(quantity.column)).any()
         }
         drives.append(DriveAssessment(name, places, found))
     found_rolls = [drive.quantities[ROLL.name] for drive in drives]
@@ -330,9 +334,8 @@ def short_names(files: Sequence[str]) -> list[str]:
 
 def _kinds(frames: RigFrames) -> list[str]:
     """Return what tells frames of one folder apart: the result, and the size where there are several."""
-    count = len(frames.files)
-    sides = [frames.numbers.get(name, np.full(count, np.nan)) for name in SIZE]
-    origins = frames.origins or [""] * count
+    sides = [frames.column(name) for name in SIZE]
+    origins = frames.origins or [""] * len(frames.files)
     if all(len(np.unique(each[np.isfinite(each)])) < 2 for each in sides):
         return list(origins)
     sizes = [f"{wide:.0f}x{high:.0f}" if wide == wide else "" for wide, high in np.transpose(sides).tolist()]
@@ -348,9 +351,8 @@ def _assessed(
     frames: RigFrames, places: NDArray[np.intp], counted: Flags, quantity: Quantity
 ) -> SequenceAssessment:
     """One quantity of one drive."""
-    nothing = np.full(len(frames.files), np.nan)
-    values = np.where(counted, frames.numbers.get(quantity.column, nothing), np.nan)[places]
-    halves = frames.numbers.get(quantity.ci_column, nothing)[places]
+    values = np.where(counted, frames.column(quantity.column), np.nan)[places]
+    halves = frames.column(quantity.ci_column)[places]
     if quantity is ROLL:
         values = _unwrapped(values)
     found = assess_sequence(values, halves * _TO_SD, quantity.scale)
