@@ -63,6 +63,7 @@ class Pictures:
     missing: str = ""
 
 
+@np.errstate(all="ignore")  # what other programs' rows have overflows
 def take_pictures(subject: Subject) -> Pictures:
     """Take what can be taken: from the images of the subject, else from its map or pair."""
     source, missing = _attempt(lambda: _source(subject).require_size(subject.frame.file, subject.row))
