@@ -16,7 +16,7 @@ from rollcli.messages import counted
 from rollcli.pictures.overlay import round_step
 from rollcli.report.page import Chart
 from rollcli.report.summary import degrees, with_interval
-from rollcli.rig.drive.assess import RigAssessment, seconds_of
+from rollcli.rig.drive.assess import RigAssessment
 from rollcli.rig.quantities import ALIGNMENT, QUANTITIES, ROLL, Quantity
 from rollcli.rig.words import answer, frame_name
 from rollcli.stereo.misalignment import Misalignment
@@ -67,12 +67,11 @@ def frame_axis(rows: Sequence[Row], rig: RigAssessment) -> FrameAxis:
 
     What stands for the broken end of a recording has no stamp, and stands where the frame before it does.
     """
-    seconds, numbers = seconds_of([row.file for row in rows]), FrameAxis(range(1, len(rows) + 1))
-    known = np.isfinite(seconds)
+    numbers, known = FrameAxis(range(1, len(rows) + 1)), np.isfinite(rig.seconds)
     ends = np.array([is_rest(row.file) for row in rows], bool)
     if not (len(rows) and known[0] and (known | ends).all()):
         return numbers
-    seconds = seconds[np.maximum.accumulate(np.where(known, np.arange(len(rows)), 0))]
+    seconds = rig.seconds[np.maximum.accumulate(np.where(known, np.arange(len(rows)), 0))]
     taken = sum(float(np.ptp(seconds[drive.frames])) for drive in rig.drives if len(drive.frames))
     whole = float(seconds[-1] - seconds[0])
     if (np.diff(seconds) < 0).any() or not taken > _LEAST_SHARE * whole:

@@ -161,7 +161,7 @@ def _axis(seconds, *, name="m.mcap#/left@{}", first=1_700_000_000 * NS, pause=No
     rows = [row(each) for each in files]
     counts = [len(rows)] if pause is None else [pause, len(rows) - pause]
     _, found = _assessed(rows, *({"roll": sequence(each)} for each in counts))
-    axis = frame_axis(rows, found)
+    axis = frame_axis(rows, replace(found, frames=replace(found.frames, files=files)))
     return [[*axis.places], axis.unit, axis.layout()]
 
 
