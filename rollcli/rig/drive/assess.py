@@ -43,18 +43,6 @@ def drive_of(file: str) -> str:
     return folder if split is not None and split[1] == folder.rpartition("/")[2] else found[1]
 
 
-def seconds_of(files: Sequence[str]) -> NDArray[np.float64]:
-    """Return when frames were taken, s since the first stamp, shape (N,); NaN where nothing tells."""
-    found = [_FRAME.match(file) if "#" in file else None for file in files]
-    stamps = [None if each is None or each[2] is None else int(each[2]) for each in found]
-    first = next((each for each in stamps if each is not None), 0)
-    seconds = np.array([np.nan if each is None else (each - first) * _NS for each in stamps])
-    known = seconds[np.isfinite(seconds)]
-    if known.size and np.ptp(known) < _LEAST_S * known.size:
-        seconds[:] = np.nan
-    return seconds
-
-
 def split_drives(
     files: Sequence[str], groups: str, kinds: Sequence[str], rolls: Floats
 ) -> list[tuple[str, NDArray[np.intp]]]:
@@ -208,8 +196,15 @@ class RigAssessment:
 
     @cached_property
     def seconds(self) -> Floats:
-        """When each frame was taken, s since the first; NaN where its name has no stamp."""
-        return seconds_of(self.frames.files)
+        """When each frame was taken, s since the first stamp; NaN where its name has none."""
+        found = [_FRAME.match(file) if "#" in file else None for file in self.frames.files]
+        stamps = [None if each is None or each[2] is None else int(each[2]) for each in found]
+        first = next((each for each in stamps if each is not None), 0)
+        seconds = np.array([np.nan if each is None else (each - first) * _NS for each in stamps])
+        known = seconds[np.isfinite(seconds)]
+        if known.size and np.ptp(known) < _LEAST_S * known.size:
+            seconds[:] = np.nan
+        return seconds
 
     def drift_per_hour(self, drive: DriveAssessment | None, quantity: Quantity = ROLL) -> Estimate:
         """Return the drift of a drive over its time; unknown where names have no stamps that ascend."""
