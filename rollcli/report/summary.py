@@ -30,9 +30,9 @@ def summarize(rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def degrees(angle: float, digits: int = 2, *, sign: bool = True) -> str:
+def degrees(angle: float, digits: int = 2) -> str:
     """Return an angle to read: with its sign, a true minus, and its unit."""
-    text = f"{angle:+.{digits}f}" if sign and round(angle, digits) else f"{abs(angle):.{digits}f}"
+    text = f"{angle:+.{digits}f}" if round(angle, digits) else f"{abs(angle):.{digits}f}"
     return text.replace("-", "−") + "°"
 
 
