@@ -5,6 +5,7 @@ import io
 import os
 import re
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +52,13 @@ def one_line(text: str) -> str:
 def counted(count: int, what: str) -> str:
     """Return how many there are, in words."""
     return f"{count:,} {what}" + ("" if count == 1 else "s")
+
+
+def listed(names: Iterable[str], most: int = 3) -> str:
+    """Join the first few names, and say how many more there are."""
+    every = list(names)
+    more = f" and {len(every) - most} more" if len(every) > most else ""
+    return ", ".join(every[:most]) + more
 
 
 def without_secrets(text: str) -> str:

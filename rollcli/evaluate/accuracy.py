@@ -17,10 +17,10 @@ from rollcli.files.atomic import is_folder
 from rollcli.files.encodings import read_disparity
 from rollcli.files.formats import read_stored
 from rollcli.files.inputs import find_inputs, stem_of
-from rollcli.files.naming import listed
 from rollcli.files.results import Result, Row, csv_table, read_result, run_path
 from rollcli.files.search import Search
 from rollcli.files.storage import is_stream, write_output
+from rollcli.messages import listed
 from rollcli.run.outputs import listed_only
 from rollcli.run.resume import recorded_options
 

@@ -17,8 +17,8 @@ from rollcli.estimator.moments import usable_of
 from rollcli.files.codecs import arrays, pictures, png, tiff
 from rollcli.files.codecs.arrays import Stored as Stored
 from rollcli.files.containers import is_archive, members, shown
-from rollcli.files.naming import listed
 from rollcli.files.storage import read_bytes, read_frame
+from rollcli.messages import listed
 
 _GREY = (np.uint8, np.uint16)  # of camera images
 

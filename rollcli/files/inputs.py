@@ -13,10 +13,11 @@ from pathlib import Path, PurePosixPath
 from rollcli.errors import UsageError, as_usage, reading
 from rollcli.files.bounded import MOST_LISTED, as_utf8
 from rollcli.files.containers import file_of, frame_name, shown
-from rollcli.files.naming import Input, listed, match_names, natural_key
+from rollcli.files.naming import Input, match_names, natural_key
 from rollcli.files.search import IMAGE_ENDINGS, LEAVE_NONE, MAP_ENDINGS, Search
 from rollcli.files.storage import STREAM, read_named
 from rollcli.files.stores.locations import base_name, is_url
+from rollcli.messages import listed
 
 _NO_TEXT = (  # what images and archives begin with
     *(b"\x89PNG", b"II*\0", b"MM\0*", b"\x93NUMPY", b"Pf\n", b"PF\n"),

@@ -60,13 +60,6 @@ def split_position(location: str) -> tuple[str, tuple[int, ...]]:
     return location[: found.start()], tuple(map(int, found[1].split("+")))
 
 
-def listed(names: Iterable[str], most: int = 3) -> str:
-    """Join the first few names, and say how many more there are."""
-    every = list(names)
-    more = f" and {len(every) - most} more" if len(every) > most else ""
-    return ", ".join(every[:most]) + more
-
-
 def natural_key(name: str) -> str:
     """Make a sort key that puts frame2 before frame10, folder by folder.
 

@@ -6,10 +6,9 @@ from typing import Any
 
 from rollcli import __version__
 from rollcli.errors import UsageError
-from rollcli.files.naming import listed
 from rollcli.files.results import Result, Row
 from rollcli.files.stores.locations import public_name
-from rollcli.messages import counted
+from rollcli.messages import counted, listed
 from rollcli.report import summary as said
 from rollcli.report.charts import frame_axis, outside
 from rollcli.report.figures import stills

@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 
 from rollcli.errors import ExitStatus, UsageError
 from rollcli.extras import require_extra
-from rollcli.files.naming import listed, natural_key
+from rollcli.files.naming import natural_key
 from rollcli.files.results import Result, read_result
 from rollcli.files.storage import is_stream, write_output
-from rollcli.messages import counted, say
+from rollcli.messages import counted, listed, say
 from rollcli.report.charts import all_charts
 from rollcli.report.options import ReportOptions
 from rollcli.report.page import Chart

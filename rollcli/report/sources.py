@@ -9,10 +9,10 @@ from pathlib import Path, PurePosixPath
 from rollcli.errors import UsageError
 from rollcli.files.atomic import is_file, is_folder
 from rollcli.files.containers import frame_name
-from rollcli.files.naming import listed
 from rollcli.files.results import Result, Row, run_path
 from rollcli.files.search import MAP_ENDINGS, objects_behind
 from rollcli.files.stores.locations import base_name, is_remote, is_url, store_of
+from rollcli.messages import listed
 from rollcli.run.frame import Frame, frame_of_row
 from rollcli.run.options import KINDS, FramesOptions, ImageKind, ImageOptions
 from rollcli.run.resume import recorded_calibrations, recorded_options

@@ -1,10 +1,11 @@
 """An assessment in words: what people read in the table, on stderr and on the page."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
-from rollcli.messages import counted
+from rollcli.messages import counted, listed
 from rollcli.rig.drive.assess import DriveAssessment, RigAssessment
 from rollcli.rig.drive.posterior import TUNING, Estimate
 from rollcli.rig.drive.quantity import SequenceAssessment
@@ -12,7 +13,6 @@ from rollcli.rig.quantities import ALIGNMENT, HEIGHT, QUANTITIES, ROLL, Quantity
 
 # a thousandth of a degree or of a metre is below what any calibration is worth
 _FEWEST_DIGITS, _MOST_DIGITS = 2, 3
-_NAMED = 3  # other drives that the last line of a run names
 
 
 def answer(estimate: Estimate, quantity: Quantity = ROLL, *, change: bool = False) -> str:
@@ -59,11 +59,8 @@ def one_line(rig: RigAssessment) -> str:
         where += f" ({too_few(drive.quantities[ROLL.name])})"
     others = [each for each in rig.drives if each is not drive and each.quantities[ROLL.name].used]
     if any(each.differs for each in rig.drives):
-        named = [
-            f"{answer(each.quantities[ROLL.name].now)} in {rig.name_of(each)}" for each in others[:_NAMED]
-        ]
-        more = f" and {len(others) - _NAMED} more" if len(others) > _NAMED else ""
-        where += f"; the drives differ: {', '.join(named)}{more}"
+        named = [f"{answer(each.quantities[ROLL.name].now)} in {rig.name_of(each)}" for each in others]
+        where += f"; the drives differ: {listed(named)}"
     return f"roll {answer(now)}{where}, {ok:,} ok, {rig.suspect:,} suspect, {rig.failed:,} failed"
 
 
@@ -137,9 +134,22 @@ def findings(rig: RigAssessment, *, roll: bool = True) -> list[str]:
                 sentences.append(f"{quantity.name} jumped by {change} at {at}")
             if found.drifts and told:
                 sentences.append(f"{quantity.name}{where} drifted by {drift_in_words(rig, drive, quantity)}")
-            if found.now.ci95 is None and quantity in QUANTITIES:
-                sentences.append(f"no interval for the {quantity.name}{where}: {too_few(found, quantity)}")
-    return sentences
+    return [*sentences, *_without_interval(rig)]
+
+
+def _without_interval(rig: RigAssessment) -> Iterator[str]:
+    """Yield a sentence for each quantity of which drives have no interval."""
+    for quantity in QUANTITIES:
+        drives = [drive for drive in rig.drives if quantity.name in drive.quantities]
+        short = [drive for drive in drives if drive.quantities[quantity.name].now.ci95 is None]
+        names = [name for drive in short if len(rig.drives) > 1 and (name := rig.name_of(drive))]
+        of = f" of {listed(names)}" if names else ""
+        if len(short) == 1:
+            why = too_few(short[0].quantities[quantity.name], quantity)
+        else:
+            why = f"an interval takes {TUNING.fewest} frames that count"
+        if short:
+            yield f"no interval for the {quantity.name}{of}: {why}"
 
 
 def too_few(found: SequenceAssessment, quantity: Quantity = ROLL) -> str:

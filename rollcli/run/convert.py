@@ -12,9 +12,8 @@ from itertools import chain
 from rollcli.errors import ExitStatus, RollcliError, UsageError
 from rollcli.extras import require_extra
 from rollcli.files.inputs import is_elsewhere, match_paths
-from rollcli.files.naming import listed
 from rollcli.files.results import Row, read_result, run_path
-from rollcli.messages import counted
+from rollcli.messages import counted, listed
 from rollcli.run import outputs
 from rollcli.run.batch import work_on, workers_for
 from rollcli.run.find import calibration_files, check_depth, check_first_size, find_frames, mask_finder

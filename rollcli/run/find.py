@@ -27,10 +27,11 @@ from rollcli.files.containers import (
     shown,
 )
 from rollcli.files.inputs import Manifest, find_inputs, named_input, pair_inputs
-from rollcli.files.naming import Input, gathered, listed, natural_key
+from rollcli.files.naming import Input, gathered, natural_key
 from rollcli.files.search import IMAGE_ENDINGS, LEAVE_NONE, MAP_ENDINGS, Search, is_place
 from rollcli.files.storage import fetch_all, read_bytes
 from rollcli.files.stores.locations import is_url, names_a_file, public_name
+from rollcli.messages import listed
 from rollcli.rig.calibration import Calibration, CalibrationOptions, require_calibration
 from rollcli.rig.read_calibration import MAX_BYTES, parse_calibration, with_numbers
 from rollcli.run.frame import Frame

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from rollcli.errors import InputError, UsageError
 from rollcli.files import results
 from rollcli.files.locking import given_as
-from rollcli.files.naming import listed, natural_key
+from rollcli.files.naming import natural_key
 from rollcli.files.storage import STREAM, is_stream, write_output
 from rollcli.files.stores.locations import base_name, is_remote
-from rollcli.messages import say
+from rollcli.messages import listed, say
 from rollcli.rig.drive.assess import RigAssessment, RigFrames, assess_frames, difference, short_names
 from rollcli.rig.drive.posterior import Estimate
 from rollcli.rig.quantities import ALIGNMENT, COLUMNS, QUANTITIES, ROLL

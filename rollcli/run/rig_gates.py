@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from rollcli.errors import ExitStatus, UsageError
-from rollcli.files.naming import listed
-from rollcli.messages import counted
+from rollcli.messages import counted, listed
 from rollcli.rig.calibration import Calibration, for_matched
 from rollcli.rig.drive.assess import DriveAssessment, RigAssessment, difference
 from rollcli.rig.drive.posterior import Estimate

@@ -30,6 +30,7 @@ from rollcli.files.results import (
 )
 from rollcli.files.search import IMAGE_ENDINGS, Search
 from rollcli.files.stores import locations
+from rollcli.messages import listed
 from rollcli.rig.calibration import Calibration
 from tests.binary_files import disparity_map, npy_header, tiff_by_tifffile
 from tests.files.recordings import small_bags
@@ -316,7 +317,7 @@ CASES = {
     "members": _members,
     **answers.CASES,
     **small_bags.CASES,
-    "listed": lambda: [naming.listed("abcdefg"[:count]) for count in range(6)],
+    "listed": lambda: [listed("abcdefg"[:count]) for count in range(6)],
 }
 
 

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError, about, as_usage
 from rollcli.files.bounded import state_of
-from rollcli.files.naming import Input, listed, split_position
+from rollcli.files.naming import Input, split_position
 from rollcli.files.recordings import messages
 from rollcli.files.recordings.bags import Topic, opened
 from rollcli.files.recordings.messages import CAMERA_INFO, COMPRESSED, DISPARITY, IMAGE, CameraInfo
-from rollcli.messages import counted
+from rollcli.messages import counted, listed
 from rollcli.rig.calibration import Calibration
 
 _RAW = re.compile("image_(raw|mono|color)")  # what image_proc rectifies [http://wiki.ros.org/image_proc]
