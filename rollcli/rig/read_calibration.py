@@ -31,7 +31,7 @@ FORMATS = (
     Format("KITTI", datasets.is_kitti, datasets.read_kitti),
     Format("DrivingStereo", has_key(":", *datasets.DRIVING_STEREO), datasets.read_driving_stereo),
     Format("Middlebury or ETH3D", has_key("=", "cam0"), datasets.read_middlebury),
-    Format("ORB-SLAM", has_key(":", "Camera.bf", "Stereo.b"), robots.read_orb_slam),
+    Format("ORB-SLAM", has_key(":", "Camera.bf", "Stereo.b", "Stereo.T_c1_c2"), robots.read_orb_slam),
     Format("ROS camera_info", has_key(":", "projection_matrix"), robots.read_ros, files=2),
     Format("OpenCV stereoRectify", opencv.is_opencv, opencv.read_opencv),
     Format("Cityscapes", has_text('"intrinsic"', '"u0"'), datasets.read_cityscapes),

@@ -267,7 +267,9 @@ CASES = {
     "rig: as one": partial(_rig, "two drives", groups="none"),
     "rig: by pattern": partial(_rig, "two drives", groups="*/1"),
     **{f"file: {name}": partial(_read, *texts) for name, texts in FILES.items()},
-    "file: kalibr, and a camera": partial(_read, files.KALIBR, focal=500.0, principal_point=(320.0, 200.0)),
+    "file: raw ones, and a camera": lambda: [
+        _read(text, focal=500.0, principal_point=(320.0, 200.0)) for text in (files.KALIBR, *_texts("raw"))
+    ],
     "file: opencv, and a baseline": partial(_read, files.OPENCV, baseline=0.5),
     "file: no file, and a part": lambda: [
         _read(**given) for given in ({"focal": 500.0}, {"baseline": 0.5}, {"principal_point": (3.0, 4.0)})

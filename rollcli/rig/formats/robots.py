@@ -3,18 +3,21 @@
 ROS camera_info YAML: one file a view, as camera_calibration and camera_calibration_parsers write it.
 sensor_msgs/CameraInfo: `projection_matrix` is of the rectified view, `camera_matrix` of the raw one; the
 right view's fourth number is Tx = -fx baseline, in metres. ORB-SLAM 2 and 3: settings with Camera.fx ... and
-Camera.bf = fx baseline, or, in 3's new form, Stereo.b; the numbers are those of the images that the settings
-are for, raw or rectified. Kalibr and ZED are of raw images, and tell of the rectified pair its baseline
-alone: rectification chooses focal length and principal point anew, and neither file holds what it chose.
+Camera.bf = fx baseline, or, in 3's new form, Stereo.b. Kalibr and ZED are of raw images, and tell of the
+rectified pair its baseline alone: rectification chooses focal length and principal point anew, and neither
+file holds what it chose. So do ORB-SLAM's settings with distortion, or with Stereo.T_c1_c2, of views that it
+undistorts or rectifies itself: fisheye rigs and most of 3's examples.
 """
 
 import math
+import re
 from dataclasses import replace
 
-from rollcli.rig.formats.fields import Fields, File, Projection, parse_yaml
+from rollcli.rig.formats.fields import Fields, File, Projection, Value, parse_yaml
 
 _MM = 1e-3
 _RAW = "is of the raw images, and gives the baseline alone"
+_DISTORTION = re.compile(r"Camera1?\.[kp]\d")
 
 
 def read_ros(first: File, second: File | None = None) -> Fields:
@@ -54,8 +57,11 @@ def _view(file: File) -> tuple[Projection, tuple[int | None, int | None]]:
 
 
 def read_orb_slam(file: File) -> Fields:
-    """Read the camera and the baseline."""
+    """Read the camera and the baseline; of a camera with distortion, whose images are raw, the baseline."""
     values = parse_yaml(file)
+    between = values.get("Stereo.T_c1_c2")
+    if isinstance(between, dict) and not {"Camera.bf", "Stereo.b"} & values.keys():
+        return _baseline_alone(file, between.get("data"), "Stereo.T_c1_c2")
 
     def read(*keys: str) -> float:
         for key in keys:
@@ -66,6 +72,8 @@ def read_orb_slam(file: File) -> Fields:
     fx, fy, cx, cy = (read(f"Camera.{each}", f"Camera1.{each}") for each in ("fx", "fy", "cx", "cy"))
     # a focal length of 0 is no calibration's
     baseline = read("Camera.bf") / (fx or 1.0) if "Camera.bf" in values else read("Stereo.b")
+    if any(file.number(value, key) for key, value in values.items() if _DISTORTION.fullmatch(key)):
+        return Fields(baseline=baseline, lacks=_RAW)
     size = file.size(values.get("Camera.width"), values.get("Camera.height"), "Camera.width")
     return Fields(fx, fy, cx, cy, baseline, 0.0, *size)
 
@@ -73,12 +81,18 @@ def read_orb_slam(file: File) -> Fields:
 def read_kalibr(file: File) -> Fields:
     """Read the distance between cam0 and cam1, metres: the last column of T_cn_cnm1."""
     camera = parse_yaml(file).get("cam1")
-    rows = camera.get("T_cn_cnm1") if isinstance(camera, dict) else None
-    what = "T_cn_cnm1 of cam1"
-    matrix = [file.numbers(row, what) for row in rows] if isinstance(rows, list) else []
-    if len(matrix) != 4 or any(len(row) != 4 for row in matrix):
+    between = camera.get("T_cn_cnm1") if isinstance(camera, dict) else None
+    return _baseline_alone(file, between, "T_cn_cnm1 of cam1")
+
+
+def _baseline_alone(file: File, between: Value | None, what: str) -> Fields:
+    """Return the distance that a 4x4 matrix from one raw camera to the other has, in rows or in one list."""
+    rows = between if isinstance(between, list) else []
+    cells: list[Value] = [cell for row in rows for cell in (row if isinstance(row, list) else [row])]
+    matrix = file.numbers(cells, what)
+    if len(matrix) != 16:
         raise file.error(f"{what} is no 4x4 matrix: the file is cut off or damaged")
-    x, y, z = (row[3] for row in matrix[:3])
+    x, y, z = matrix[3:12:4]
     if abs(y) > abs(x):
         raise file.vertical()
     return Fields(baseline=math.hypot(x, y, z), lacks=_RAW)
