@@ -41,7 +41,9 @@ def read_kitti(file: File) -> Fields:
             f"has only {views}: the projections of both views are needed, "
             f"{key.format(0)} and {key.format(1)} or {key.format(2)} and {key.format(3)}"
         )
-    first, *other = (_kitti_fields(file, values, *map(key.format, pair)) for pair in pairs)
+    # other makers' files of two cameras have the other pair filled in, with one view twice
+    apart = [pair for pair in pairs if len({values[key.format(view)] for view in pair}) == 2]
+    first, *other = (_kitti_fields(file, values, *map(key.format, pair)) for pair in apart or pairs[:1])
     grey, *colour = (f"{each.baseline:.5f}" for each in (first, *other))
     if colour not in ([], [grey]):
         note = (
