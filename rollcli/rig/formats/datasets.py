@@ -11,14 +11,13 @@ calibration.pdf): *_camera.json with intrinsic {fx, fy, u0, v0} and extrinsic {b
 from collections.abc import Mapping
 from dataclasses import replace
 
-from rollcli.rig.formats.fields import Fields, File
+from rollcli.rig.formats.fields import SAME_DOFFS, Fields, File
 
 _RAW = {f"P_rect_0{view}" for view in range(4)}
 _BENCHMARK = {f"P{view}" for view in range(4)}
 DRIVING_STEREO = ("P_rect_101", "P_rect_103")
 _GREY, _COLOUR = ("0", "1"), ("2", "3")
 _MM = 1e-3
-_SAME_DOFFS = 0.5  # px
 
 
 def is_kitti(file: File) -> bool:
@@ -94,7 +93,7 @@ def read_middlebury(file: File) -> Fields:
         right = _camera(file, values, "cam1")
         file.require_one_pair((fx, fy, cy), (right[0], right[1], right[3]))
         between = right[2] - cx
-        if doffs is not None and abs(doffs - between) > _SAME_DOFFS:
+        if doffs is not None and abs(doffs - between) > SAME_DOFFS:
             raise file.error(f"is contradictory: doffs is {doffs:g} px, its cameras differ by {between:g} px")
         doffs = between if doffs is None else doffs
     baseline = _MM * file.number(values["baseline"], "baseline") if "baseline" in values else None

@@ -14,6 +14,7 @@ Value = Union[str, list["Value"], dict[str, "Value"]]  # noqa: UP007 - the alias
 _LONGEST = 40  # characters of a number: no calibration has more digits
 _SAME_FOCAL = 1e-3  # relative: the views of a rectified pair have one focal length
 _SAME_ROW = 0.5  # px: and one row of the principal point
+SAME_DOFFS = 0.5  # px: where a file gives it twice
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from dataclasses import replace
 from xml.etree import ElementTree
 
 from rollcli.rig.calibration import LIKELY_BASELINE
-from rollcli.rig.formats.fields import Fields, File, Value, parse_yaml
+from rollcli.rig.formats.fields import SAME_DOFFS, Fields, File, Value, parse_yaml
 
 _KEYS = re.compile(r"""(?:^|[\s<{,"])(?:P1|P2|Q|M1)(?:"?\s*:|[\s>])""")
 _MARKS = ("%YAML:1.0", "%YAML 1.0", "<opencv_storage>", "opencv-matrix")
@@ -39,11 +39,12 @@ def read_opencv(file: File) -> Fields:
     if length < 0:
         raise file.swapped()
     if len(said) == 2:
-        both = [[vars(each)[name] for name in ("fx", "cx", "cy", "baseline")] for each in said]
-        if any(abs(one - two) > _SAME * abs(one) for one, two in zip(*both, strict=True)):
+        both = [[vars(each)[name] for name in ("fx", "cx", "cy", "baseline", "doffs")] for each in said]
+        within = [_SAME * abs(each) for each in both[0][:4]] + [SAME_DOFFS]
+        if any(abs(one - two) > most for one, two, most in zip(*both, within, strict=True)):
             one, two = (", ".join(f"{value:g}" for value in values) for values in both)
             raise file.error(
-                f"is contradictory: fx, cx, cy and the baseline are {one} in P1 and P2, and {two} in Q"
+                f"is contradictory: fx, cx, cy, the baseline and doffs are {one} in P1 and P2, and {two} in Q"
             )
     if not low <= length <= high:
         unit = "in the unit of its chessboard's squares, which cannot be metres"
