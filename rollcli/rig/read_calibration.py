@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, TypeVar
 from rollcli.errors import InputError, UsageError
 from rollcli.rig.calibration import Calibration, CalibrationOptions
 from rollcli.rig.formats import datasets, opencv, robots
-from rollcli.rig.formats.fields import Fields, File, has_key, has_text
+from rollcli.rig.formats.fields import INSTEAD, Fields, File, has_key, has_text
 
 Known = TypeVar("Known", Fields, Calibration)
 
@@ -26,16 +26,16 @@ class Format(NamedTuple):
     files: int = 1
 
 
-# the first that recognises a file reads it: ORB-SLAM's settings can hold OpenCV's matrices
+# the first that recognises a file reads it: ORB-SLAM's settings can hold OpenCV's matrices, Kalibr's ROS's
 FORMATS = (
     Format("KITTI", datasets.is_kitti, datasets.read_kitti),
     Format("DrivingStereo", has_key(":", *datasets.DRIVING_STEREO), datasets.read_driving_stereo),
     Format("Middlebury or ETH3D", has_key("=", "cam0"), datasets.read_middlebury),
     Format("ORB-SLAM", has_key(":", "Camera.bf", "Stereo.b", "Stereo.T_c1_c2"), robots.read_orb_slam),
+    Format("Kalibr", has_key(":", "T_cn_cnm1"), robots.read_kalibr),
     Format("ROS camera_info", has_key(":", "projection_matrix"), robots.read_ros, files=2),
     Format("OpenCV stereoRectify", opencv.is_opencv, opencv.read_opencv),
     Format("Cityscapes", has_text('"intrinsic"', '"u0"'), datasets.read_cityscapes),
-    Format("Kalibr", has_key(":", "T_cn_cnm1"), robots.read_kalibr),
     Format("ZED", has_text("[LEFT_CAM_"), robots.read_zed),
 )
 
@@ -96,7 +96,7 @@ def _read(files: Sequence[File]) -> Fields:
         form = next((each for each in FORMATS if each.recognise(file)), None)
         if form is None:
             known = ", ".join(each.name for each in FORMATS)
-            raise file.error(f"is no calibration of a known format ({known})")
+            raise file.error(f"is no calibration of a known format ({known}); {INSTEAD}")
         forms.append(form)
     if len(files) > min(form.files for form in forms) or len(set(forms)) > 1:
         raise files[1].error("only a pair of ROS camera_info files is given as two --calib; give one file")

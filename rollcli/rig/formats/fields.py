@@ -15,6 +15,7 @@ _LONGEST = 40  # characters of a number: no calibration has more digits
 _SAME_FOCAL = 1e-3  # relative: the views of a rectified pair have one focal length
 _SAME_ROW = 0.5  # px: and one row of the principal point
 SAME_DOFFS = 0.5  # px: where a file gives it twice
+INSTEAD = "give --focal, --principal-point and --baseline of the rectified pair instead"
 
 
 @dataclass(frozen=True)

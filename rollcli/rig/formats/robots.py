@@ -13,7 +13,7 @@ import math
 import re
 from dataclasses import replace
 
-from rollcli.rig.formats.fields import Fields, File, Projection, Value, parse_yaml
+from rollcli.rig.formats.fields import INSTEAD, Fields, File, Projection, Value, parse_yaml
 
 _MM = 1e-3
 _RAW = "is of the raw images, and gives the baseline alone"
@@ -61,7 +61,7 @@ def read_orb_slam(file: File) -> Fields:
     values = parse_yaml(file)
     between = values.get("Stereo.T_c1_c2")
     if isinstance(between, dict) and not {"Camera.bf", "Stereo.b"} & values.keys():
-        return _baseline_alone(file, between.get("data"), "Stereo.T_c1_c2")
+        return _baseline_alone(file, between.get("data", ""), "Stereo.T_c1_c2")
 
     def read(*keys: str) -> float:
         for key in keys:
@@ -81,11 +81,12 @@ def read_orb_slam(file: File) -> Fields:
 def read_kalibr(file: File) -> Fields:
     """Read the distance between cam0 and cam1, metres: the last column of T_cn_cnm1."""
     camera = parse_yaml(file).get("cam1")
-    between = camera.get("T_cn_cnm1") if isinstance(camera, dict) else None
-    return _baseline_alone(file, between, "T_cn_cnm1 of cam1")
+    if not isinstance(camera, dict) or "T_cn_cnm1" not in camera:
+        raise file.error(f"has no cam1 with T_cn_cnm1 at its top level, as Kalibr's have; {INSTEAD}")
+    return _baseline_alone(file, camera["T_cn_cnm1"], "T_cn_cnm1 of cam1")
 
 
-def _baseline_alone(file: File, between: Value | None, what: str) -> Fields:
+def _baseline_alone(file: File, between: Value, what: str) -> Fields:
     """Return the distance that a 4x4 matrix from one raw camera to the other has, in rows or in one list."""
     rows = between if isinstance(between, list) else []
     cells: list[Value] = [cell for row in rows for cell in (row if isinstance(row, list) else [row])]
