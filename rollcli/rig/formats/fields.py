@@ -135,7 +135,7 @@ class File(NamedTuple):
         if abs(up) > abs(across):
             raise self.vertical()
         if across == 0:
-            raise self.error("has no distance between the cameras: its projections are the same")
+            raise self.error("has no distance between the cameras: they were not calibrated as a pair")
         self.require_one_pair((left.fx, left.fy, left.cy), (right.fx, right.fy, right.cy))
         return Fields(left.fx, left.fy, left.cx, left.cy, across, right.cx - left.cx)
 
