@@ -169,6 +169,7 @@ FILES = {
 }
 
 
+CAMERA = {"focal": 500.0, "principal_point": (320.0, 200.0)}
 PLAIN = files.Rig()
 INPUTS = Path(__file__).with_name("inputs.txt").read_text("utf-8")
 
@@ -267,17 +268,13 @@ CASES = {
     "rig: as one": partial(_rig, "two drives", groups="none"),
     "rig: by pattern": partial(_rig, "two drives", groups="*/1"),
     **{f"file: {name}": partial(_read, *texts) for name, texts in FILES.items()},
-    "file: raw ones, and a camera": lambda: [
-        _read(text, focal=500.0, principal_point=(320.0, 200.0)) for text in (files.KALIBR, *_texts("raw"))
-    ],
+    "file: raw, and a camera": lambda: [_read(each, **CAMERA) for each in (files.KALIBR, *_texts("raw"))],
     "file: opencv, and a baseline": partial(_read, files.OPENCV, baseline=0.5),
     "file: no file, and a part": lambda: [
         _read(**given) for given in ({"focal": 500.0}, {"baseline": 0.5}, {"principal_point": (3.0, 4.0)})
     ],
     **{
-        f"file: {name}, and numbers": partial(
-            _read, *texts, baseline=0.3, focal=500.0, principal_point=(320.0, 200.0), doffs=2.0
-        )
+        f"file: {name}, and numbers": partial(_read, *texts, baseline=0.3, doffs=2.0, **CAMERA)
         for name, texts in FILES.items()
         if name in ("zed", "kalibr", "middlebury", "no file")
     },
