@@ -87,7 +87,7 @@ def _text(name: str, data: bytes) -> File:
     try:
         return File(name, data.decode("utf-8-sig"))
     except UnicodeDecodeError:
-        raise InputError(f"{name}: is not text, so it is no calibration") from None
+        raise InputError(f"{name}: is not text, so it is no calibration; {INSTEAD}") from None
 
 
 def _read(files: Sequence[File]) -> Fields:
