@@ -1,6 +1,7 @@
 """Where the files that are written for a frame lie, and the checks before anything is read or written."""
 
 import contextlib
+import errno
 import hashlib
 import os
 import posixpath
@@ -10,7 +11,7 @@ from itertools import chain, filterfalse, islice
 from pathlib import Path
 from unicodedata import normalize
 
-from rollcli.errors import InputError, OutputError, UsageError
+from rollcli.errors import InputError, OutputError, UsageError, output_error
 from rollcli.files import storage
 from rollcli.files.atomic import is_folder, mark_path, remove_leftovers
 from rollcli.files.containers import BAGS, file_of, is_archive, shown
@@ -222,7 +223,7 @@ def listed_only(
     for folder, path in {os.path.split(each)[0]: each for each in written[::-1] if not is_url(each)}.items():
         above = next(filter(os.path.lexists, (folder, *map(str, Path(folder).parents))), "")
         if above and not is_folder(above):
-            raise OutputError(f"{path}: cannot be written: {above} is no folder")
+            raise output_error(path, FileExistsError(errno.EEXIST, "", above))
     if running.dry_run:
         list_files(files())
     return running.dry_run
