@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 from typing import TypeVar
 
 from rollcli.files.stores.locations import is_url, public_name
@@ -17,12 +18,11 @@ _WORDS = (
     r"(?<![A-Za-z])(?:left|LEFT)(?![a-z])|(?<![A-Z])Left(?![a-z])|(?<![A-Za-z])[lL](?![A-Za-z])",
     r"(?<![A-Za-z])(?:right|RIGHT)(?![a-z])|(?<![A-Z])Right(?![a-z])|(?<![A-Za-z])[rR](?![A-Za-z])",
 )
-# numbers count as marks after such a word, or at the end of a name: im0, image_02, cam1/000.png, 000123_0
+# numbers count as marks after such a word, else at the end of a name: im0, image_02, cam1/000.png, 000123_0
 _NEVER = "(?!)"
 _NUMBERS = ((_NEVER, _NEVER), ("0", "1"), ("2", "3"), ("1", "2"), ("1", "5"), ("2", "6"))
-_NUMBERED = (
-    r"((?<![A-Za-z])(?:im|img|image|cam|camera|view)[_-]?|(?<=[A-Za-z0-9])[_-](?=0*{0}$))0*{0}(?![0-9])"
-)
+_AFTER_WORD = r"((?<![A-Za-z])(?:im|img|image|cam|camera|view)[_-]?)0*{}(?![0-9])"
+_AT_END = r"((?<=[A-Za-z0-9])[_-])0*{}$"
 _POSITION = re.compile(r"#@([0-9]+(?:\+[0-9]+)+)$")
 
 
@@ -114,14 +114,16 @@ def match_names(lefts: Sequence[str], rights: Sequence[str], *, marked: bool = F
         equal = _matching(map(_stem, lefts), map(_stem, rights))
         if equal[0]:
             return equal
-    attempts = [
-        _matching(
-            (_unmarked(each, left_mark, 0, marked) for each in lefts),
-            (_unmarked(each, right_mark, 1, marked) for each in rights),
+    best: Matching = [], None
+    for last, (left_mark, right_mark) in product((False, True), _NUMBERS):
+        found = _matching(
+            (_unmarked(each, left_mark, 0, marked, last) for each in lefts),
+            (_unmarked(each, right_mark, 1, marked, last) for each in rights),
         )
-        for left_mark, right_mark in _NUMBERS
-    ]
-    return max(attempts, key=lambda each: len(each[0]))
+        best = max(best, found, key=lambda each: len(each[0]))
+        if len(best[0]) == len(lefts):
+            break
+    return best
 
 
 def _matching(*keys_of: Iterable[str | None]) -> Matching:
@@ -146,11 +148,12 @@ def _stem(relative: str) -> str:
     return folder + slash + (name.rpartition(".")[0] or name)
 
 
-def _unmarked(relative: str, number: str, side: int, marked: bool) -> str | None:
-    """Cut ending and marks off a path; None when `marked` and it has none."""
+def _unmarked(relative: str, number: str, side: int, marked: bool, last: bool) -> str | None:
+    """Cut ending and marks off a path, with `last` those at an end too; None if `marked` and it has none."""
     parts = []
     for part in _stem(relative).split("/"):
-        without = re.sub(_WORDS[side], "*", part)
-        parts.append(re.sub(_NUMBERED.format(number), r"\1*", without))
+        key, found = re.subn(_AFTER_WORD.format(number), r"\1*", re.sub(_WORDS[side], "*", part))
+        # im1_0001: 0001 is the frame's
+        parts.append(re.sub(_AT_END.format(number), r"\1*", key) if last and not found else key)
     key = "/".join(parts)
     return None if marked and "*" not in key else key
