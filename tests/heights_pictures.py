@@ -1,7 +1,7 @@
 """Make the pictures of heights over the road anew: python -m tests.heights_pictures
 
 A pothole and a street are rendered, matched and estimated as `estimate` does it. README: the left image, and
-the heights over it. imaging/pictures/README: the authors' transformed disparity beside the heights.
+the heights over it. rollcli/pictures/README.md: the authors' transformed disparity beside the heights.
 """
 
 from pathlib import Path
@@ -30,16 +30,15 @@ _GAP, _QUALITY = 8, 85
 def main(folder: Path = PICTURES) -> None:
     """Write both pictures."""
     frames = [render_frame(spec) for spec in SCENES]
-    parts = [_drawn(frame) for frame in frames]
-    photos = [as_bgr(frame.left, frame.spec.size) for frame in frames]
+    parts = [_drawn(frame, spec) for frame, spec in zip(frames, SCENES, strict=True)]
+    photos = [as_bgr(frame.left, spec.size) for frame, spec in zip(frames, SCENES, strict=True)]
     rows = [_beside(photo, heights) for photo, (_, heights) in zip(photos, parts, strict=True)]
     _write(folder / "heights.webp", rows)
     _write(folder / "transformed.webp", [_beside(*each) for each in parts])
 
 
-def _drawn(frame: RenderedFrame) -> tuple[np.ndarray, np.ndarray]:
+def _drawn(frame: RenderedFrame, spec: FrameSpec) -> tuple[np.ndarray, np.ndarray]:
     """The transformed disparity of the authors, and the heights over the left image."""
-    spec = frame.spec
     disparity = rollcli.compute_disparity(frame.left, frame.right)
     estimate = rollcli.estimate_roll(disparity)
     rig = Calibration(spec.focal, spec.focal, *spec.centre, spec.baseline)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rollcli import estimate_roll, read_disparity
+from tests import heights_pictures
 from tests.readme_picture import MAP, PICTURE, picture
 from tests.readme_tables import OPTIONS_PAGE, with_tables
 from tests.run_cli import ROOT, ended, environment, rollcli, write_program
@@ -52,6 +53,14 @@ def test_its_picture_and_the_angle_below_it_are_those_of_a_run():
     roll = estimate_roll(read_disparity(MAP))
     angle, half = math.degrees(roll.theta), math.degrees(roll.ci95)
     assert f"{angle:.2f}° ± {half:.2f}°".replace("-", "−") in README
+
+
+@pytest.mark.slow
+def test_its_pictures_of_heights_are_those_of_this_version(tmp_path):
+    heights_pictures.main(tmp_path)
+    for made in ("heights.webp", "transformed.webp"):
+        shown, now = (cv2.imread(str(each / made)) for each in (heights_pictures.PICTURES, tmp_path))
+        assert np.abs(shown.astype(int) - now).mean() < 1, "run: python -m tests.heights_pictures"
 
 
 def test_the_first_run_prints_what_it_shows(tmp_path):
