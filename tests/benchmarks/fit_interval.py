@@ -2,11 +2,14 @@
 
     python tests/benchmarks/fit_interval.py [FRAMES]
 
+FRAMES smooth scenes (400; 32 at least) and half as many rough ones to fit on, and as many to judge on.
+
 Prints the factor of the noise with which 95 % of the intervals hold the true roll on the first half of the
 smooth scenes, then the factor of the unevenness with which they hold the roll of the lane on rough ones; and
 the coverage that these and the factors in use give on the second half, by kind of scene. Half of the frames
 have rolls within +-10, half within +-35 degrees; half of the roads are flat, the others have all cross
-sections. Rough roads are of the classes A to D; their lane has a range of rolls, as a lidar's (`lane_rolls`).
+sections. Rough roads are of the classes A to D; their lane has a range of rolls, as a lidar's
+(`lane_rolls_of`).
 """
 
 import itertools
