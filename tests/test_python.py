@@ -255,6 +255,8 @@ def test_a_depth_map_is_told_as_the_command_tells_it(disparity):
     stored = rollcli.estimate_roll(disparity * 256, calibration=CALIB)
     assert stored.status == "suspect"
     assert stored.message.endswith("the numbers look 256 times too large; give the numbers / 256")
+    shares = rollcli.estimate_roll(disparity / 1000, calibration=CALIB)
+    assert (shares.status, shares.message[:24]) == ("suspect", "no disparity reaches 1 p")
 
 
 def test_a_photograph_is_told_as_the_command_tells_it():

@@ -32,6 +32,7 @@ REMEDIES = {
     "photograph": ("give photographs by --left and --right", "give both views to rollcli.estimate_pair"),
     "encoding": ("--encoding {name} (stored / {by})", "the numbers / {by}"),
     "scale": ("--scale, the pixels that a stored number of 1 stands for", "pixels"),
+    "metres": ("--scale, the metres that a stored number of 1 stands for", "metres"),
 }
 # rows alone would mirror what a camera saw that hung, and its roll would have the other sign
 _UPSIDE_DOWN = "upside down: reverse the order of its rows; if the camera hung, that of its columns, too"
@@ -102,8 +103,8 @@ def require_positive(stored: Stored, name: str) -> None:
         )
 
 
-def too_large(disparity: NDArray[Any], stored: Stored, encoding: str, *, python: bool = False) -> str:
-    """Say that the disparities cannot be pixels, and what would divide them; empty when they can.
+def not_pixels(disparity: NDArray[Any], stored: Stored, encoding: str, *, python: bool = False) -> str:
+    """Say that the disparities cannot be pixels, and what would scale them; empty when they can.
 
     Parameters
     ----------
@@ -116,8 +117,11 @@ def too_large(disparity: NDArray[Any], stored: Stored, encoding: str, *, python:
     python : bool
         Whether the words are for a caller in Python.
     """
-    width = disparity.shape[1]
-    if not disparity.max() > width:
+    width, largest = disparity.shape[1], disparity.max()
+    scale = REMEDIES["metres" if encoding == Encoding.DEPTH else "scale"][python]
+    if 0 < largest < 1:  # a matcher tells none of these from another; such are depths in mm, and shares
+        return f"no disparity reaches 1 px, the largest is {largest:.2g}: give {scale}"
+    if not largest > width:
         return ""
     valid = disparity[disparity > 0]
     share = np.count_nonzero(valid > width) / valid.size
@@ -128,14 +132,14 @@ def too_large(disparity: NDArray[Any], stored: Stored, encoding: str, *, python:
         f"(up to {valid.max():.0f})"
     )
     if encoding == Encoding.DEPTH:
-        return f"{said}: give --scale, the metres that a stored number of 1 stands for"
+        return f"{said}: give {scale}"
     numbers = stored.values[disparity > 0]
     near = float(np.quantile(numbers.astype(np.float64), 1 - TUNING.beyond))
     fitting = [
         (name, by) for name, by in _DIVISORS if name != encoding and near / by <= TUNING.plausible * width
     ]
     if not fitting:
-        return f"{said}: give {REMEDIES['scale'][python]}"
+        return f"{said}: give {scale}"
     times = " or ".join(str(by) for _, by in fitting)
     remedy = " or ".join(REMEDIES["encoding"][python].format(name=name, by=by) for name, by in fitting)
     return f"{said}: the numbers look {times} times too large; give {remedy}"

@@ -220,7 +220,7 @@ def _rotated(source: Source, of: Frame, options: DerotateOptions, paths: Mapping
     files = {paths["derotated"]: turned}
     if options.save_matrix:
         files[paths["matrix"]] = _matrix_text(source.disparity.shape, roll, options.expand)
-    # its stored numbers stay as they are, and may be too large for pixels
+    # its stored numbers stay as they are, and may be no pixels
     warnings = {code: text for code, text in source.warnings.items() if code != "beyond"}
     return files, warnings
 

@@ -21,7 +21,7 @@ from rollcli.files.formats import Stored, read_image, read_stored
 from rollcli.files.naming import Input
 from rollcli.rig.calibration import Calibration, request_with
 from rollcli.rig.pose import with_pose
-from rollcli.run.diagnosis import REMEDIES, estimate_or_liken, looks_like, too_large
+from rollcli.run.diagnosis import REMEDIES, estimate_or_liken, looks_like, not_pixels
 from rollcli.run.find import given_calibration
 from rollcli.run.options import FramesOptions, MethodOptions
 from rollcli.run.read import Source, matched_source, road_finder
@@ -125,9 +125,10 @@ def estimate_roll(
 
     estimate, likeness = estimate_or_liken(values, request, like, mask=mask, road_mask=road_mask)
     beyond = ""
-    if rig is not None and (values > values.shape[1]).any():  # most maps need not be read again for this
+    # most maps need not be read again for this
+    if rig is not None and ((values > values.shape[1]).any() or not (values >= 1).any()):
         # the roll is the same at any scale, pitch and height are not
-        beyond = too_large(*_in_pixels(values), "px", python=True)
+        beyond = not_pixels(*_in_pixels(values), "px", python=True)
     estimate = Source(values, doubts={"beyond": beyond}).doubted(estimate, likeness)
     return estimate if rig is None else with_pose(estimate, rig)
 

@@ -23,7 +23,7 @@ from rollcli.files.results import ALIGNMENT_COLUMNS, Row
 from rollcli.files.storage import noting, read_bytes, state_of
 from rollcli.messages import one_line, printable
 from rollcli.rig.calibration import Calibration, one_factor
-from rollcli.run.diagnosis import require_positive, too_large
+from rollcli.run.diagnosis import not_pixels, require_positive
 from rollcli.run.frame import Decoded, Frame, FrameResult, ReadAs, failed_frame
 from rollcli.run.options import FramesOptions, RegionOptions
 from rollcli.stereo.correction import LARGEST
@@ -96,7 +96,7 @@ class Source:
     encoding : str
         How the stored numbers were read.
     warnings : mapping of str to str
-        Why that may be wrong, by code; "beyond": the disparities are too large to be pixels.
+        Why that may be wrong, by code; "beyond": the disparities cannot be pixels.
     searched : tuple of int, or None
         First and last disparity searched, px; pairs only.
     slope_error : float
@@ -165,7 +165,7 @@ class Source:
 
     @property
     def _doubts_of_map(self) -> list[str]:
-        """All but that numbers are too large to be pixels: that is of the pose, and seen by all readers."""
+        """All but that numbers cannot be pixels: that is of the pose, and seen by all readers."""
         return [text for code, text in self.doubts.items() if text and code != "beyond"]
 
     @property
@@ -248,8 +248,9 @@ def _read(frame: Frame, options: FramesOptions) -> Source:
     with about(frame.file):
         found = to_disparity(stored, **given._asdict(), calibration=frame.calibration)
     encoding = found.encoding.value
-    beyond = {"beyond": too_large(found.disparity, stored, encoding)}
-    warnings = {**found.warnings, **beyond}
+    told = found.warnings.get("encoding")
+    beyond = {"beyond": told or not_pixels(found.disparity, stored, encoding)}
+    warnings = found.warnings if told else {**found.warnings, **beyond}
     source = Source(found.disparity, stored=stored, encoding=encoding, warnings=warnings, **_carried(stored))
     # the roll is the same at any scale, pitch and height are not
     return source if frame.calibration is None else replace(source, doubts={**source.doubts, **beyond})
