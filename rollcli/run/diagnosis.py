@@ -32,6 +32,7 @@ REMEDIES = {
     "photograph": ("give photographs by --left and --right", "give both views to rollcli.estimate_pair"),
     "encoding": ("--encoding {name} (stored / {by})", "the numbers / {by}"),
     "scale": ("--scale, the pixels that a stored number of 1 stands for", "pixels"),
+    "sign": ("give --scale -1", "give the numbers with the other sign"),
     "metres": ("--scale, the metres that a stored number of 1 stands for", "metres"),
 }
 # rows alone would mirror what a camera saw that hung, and its roll would have the other sign
@@ -58,6 +59,8 @@ class DiagnosisTuning:
     downward : float
         Correlation of a row and the median of its disparities from which a map has its near parts below:
         no need to try what else it may be. In depth maps and in maps that are upside down -0.95 to 0.0.
+    marks : int
+        As many negative numbers may stand for no data.
     every : int
         Take each such row, and column where these need not be neighbours: enough for shares and medians.
     wide : float
@@ -71,6 +74,7 @@ class DiagnosisTuning:
     noise_step: int = 64
     noise: float = 0.1
     downward: float = 0.2
+    marks: int = 16
     every: int = 4
     wide: float = math.radians(5.0)
 
@@ -162,6 +166,8 @@ def looks_like(
     """
     if stored is not None and _is_photograph(stored.values):
         return f"looks like a photograph, not a disparity map: {REMEDIES['photograph'][python]}"
+    if stored is not None and (options.encoding.scale or 1) > 0 and _is_negative(stored.values):
+        return f"most numbers are negative, as if stored with the other sign: {REMEDIES['sign'][python]}"
     if _grows_downward(disparity):
         return ""
     if stored is None:
@@ -219,6 +225,13 @@ def _is_photograph(values: NDArray[Any]) -> bool:
         and np.mean(steps == 0) < TUNING.equal
         and np.mean(steps > TUNING.noise_step) < TUNING.noise
     )
+
+
+def _is_negative(values: NDArray[Any]) -> bool:
+    """Tell whether most numbers are negative, and more of them than may be marks for no data."""
+    few = values[:: TUNING.every, :: TUNING.every]
+    negative = few[few < 0]
+    return bool(negative.size > np.count_nonzero(few > 0) and np.unique(negative).size > TUNING.marks)
 
 
 def _grows_downward(disparity: NDArray[Any]) -> bool:

@@ -32,6 +32,7 @@ def test_a_map_is_taken_for_nothing_else_and_its_depths_and_its_reverse_are_know
     assert DEPTH in verdict((depth / 1000).astype(np.float32))  # in km
     assert DEPTH in verdict(np.clip(np.rint(1000 * depth), 0, 65535).astype(np.uint16))
     assert UPSIDE_DOWN in verdict(disparity[::-1])  # or a depth map: few roads tell which
+    assert "--scale -1" in verdict(np.where(np.arange(len(disparity))[:, None] < 9, 0.2, -disparity))
 
 
 @pytest.mark.parametrize("path", PHOTOGRAPHS, ids=lambda path: f"{path.parent.name}-{path.stem}")
