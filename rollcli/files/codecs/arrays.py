@@ -118,7 +118,7 @@ _UNREAL = {"O": "Python objects (a pickle, which is never loaded)", "c": "comple
 def decode_npy(data: bytes) -> Stored:
     """Return the array of an .npy file: real numbers or booleans, shape (H, W), any byte and axis order.
 
-    (1, H, W) and (H, W, 1), as networks write them, are (H, W).
+    (1, H, W), (1, 1, H, W) and (H, W, 1), as networks write them, are (H, W).
     """
     dtype, fortran, shape, start = check_npy(data, len(data))
     values = np.frombuffer(data, dtype, count=math.prod(shape), offset=start)
@@ -143,8 +143,8 @@ def check_npy(head: bytes, size: int) -> tuple[np.dtype[Any], bool, tuple[int, .
         raise InputError("its NPY header cannot be read")
     shape = tuple(int(side) for side in re.findall(r"\d+", sides[1]))
     dtype = _real_dtype(descr[1])
-    if len(shape) == 3 and 1 in (shape[0], shape[2]):  # the numbers lie as those of (H, W) do
-        shape = shape[1:] if shape[0] == 1 else shape[:2]
+    while len(shape) > 2 and 1 in (shape[0], shape[-1]):  # the numbers lie as those of (H, W) do
+        shape = shape[1:] if shape[0] == 1 else shape[:-1]
     require_map_shape(shape)
     needed = math.prod(shape) * dtype.itemsize
     require_bytes(f"shape {shape} of {dtype} needs", needed, size - start)
