@@ -146,9 +146,10 @@ def _by_name(lefts: list[Input], rights: list[Input]) -> list[tuple[Input, Input
             f"left and right, L1 and R1): {listed(each.name for each in lefts)}; {_OTHER_SIDE}"
         )
     if alone:
-        by_order = len(lefts) == len(rights) and not pairs
-        hint = "; --match order pairs the first with the first, and so on" if by_order else ""
-        raise UsageError(f"no partner found for {listed(alone)}{hint}")
+        remedy = "--exclude leaves out what is no view"
+        if len(lefts) == len(rights) and not pairs:
+            remedy = "--match order pairs the first with the first, and so on"
+        raise UsageError(f"no partner found for {listed(alone)}; {remedy}")
     return pairs
 
 
