@@ -24,7 +24,10 @@ from rollcli.files.bounded import MOST_EXPANSION, MOST_SMALL, most_unpacked
 _FLOAT32 = 4
 _MOST = 2**29  # bytes: 134 million pixels
 
-COLOUR_REMEDY = "a disparity map has one channel; photographs are given by --left and --right"
+COLOUR_REMEDY = (
+    "a disparity map has one channel: its numbers, unpacked, can be saved as NPY; "
+    "photographs are given by --left and --right"
+)
 
 
 @dataclass(frozen=True)
