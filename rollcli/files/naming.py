@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
@@ -114,12 +114,13 @@ def match_names(lefts: Sequence[str], rights: Sequence[str], *, marked: bool = F
         equal = _matching(map(_stem, lefts), map(_stem, rights))
         if equal[0]:
             return equal
+    left, right = (
+        [re.sub(word, "*", _stem(each)) for each in names]
+        for word, names in zip(_WORDS, (lefts, rights), strict=True)
+    )
     best: Matching = [], None
-    for last, (left_mark, right_mark) in product((False, True), _NUMBERS):
-        found = _matching(
-            (_unmarked(each, left_mark, 0, marked, last) for each in lefts),
-            (_unmarked(each, right_mark, 1, marked, last) for each in rights),
-        )
+    for last, (left_mark, right_mark) in (*product((False,), _NUMBERS), *product((True,), _NUMBERS[1:])):
+        found = _matching(_keys(left, left_mark, marked, last), _keys(right, right_mark, marked, last))
         best = max(best, found, key=lambda each: len(each[0]))
         if len(best[0]) == len(lefts):
             break
@@ -148,12 +149,13 @@ def _stem(relative: str) -> str:
     return folder + slash + (name.rpartition(".")[0] or name)
 
 
-def _unmarked(relative: str, number: str, side: int, marked: bool, last: bool) -> str | None:
-    """Cut ending and marks off a path, with `last` those at an end too; None if `marked` and it has none."""
-    parts = []
-    for part in _stem(relative).split("/"):
-        key, found = re.subn(_AFTER_WORD.format(number), r"\1*", re.sub(_WORDS[side], "*", part))
-        # im1_0001: 0001 is the frame's
-        parts.append(re.sub(_AT_END.format(number), r"\1*", key) if last and not found else key)
-    key = "/".join(parts)
-    return None if marked and "*" not in key else key
+def _keys(names: Iterable[str], number: str, marked: bool, last: bool) -> Iterator[str | None]:
+    """Cut off numbers that are marks, with `last` those at ends too; None if `marked` and there is none."""
+    after_word, at_end = (re.compile(each.format(number)) for each in (_AFTER_WORD, _AT_END))
+    for name in names:
+        if last:  # im1_0001: 0001 is the frame's
+            parts = (after_word.subn(r"\1*", part) for part in name.split("/"))
+            key = "/".join(part if found else at_end.sub(r"\1*", part) for part, found in parts)
+        else:
+            key = after_word.sub(r"\1*", name)
+        yield None if marked and "*" not in key else key
