@@ -55,7 +55,8 @@ _PARABOLA = Needs(
 )
 _LEARNS = Needs(lambda ctx: ctx.params["method"] == "gd", "only --method gd has a learning rate")
 _ITERATES = Needs(
-    lambda ctx: ctx.params["method"] not in AREAS, "--method {method} does not iterate on the angle"
+    lambda ctx: ctx.params["method"] not in (*AREAS, "exact"),
+    "--method {method} does not iterate on the angle",
 )
 _FINDS = Needs(lambda ctx: ctx.params["road"] != "all", "--road all looks for no road")
 _SEARCHES = Needs(  # areas chooses among its planes by their roll

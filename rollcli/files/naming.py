@@ -13,15 +13,17 @@ from rollcli.files.stores.locations import is_url, public_name
 Key = TypeVar("Key")
 Value = TypeVar("Value")
 
-# the marks of a left and of a right image: a word or letter of its own, leftImg8bit, m1_L1, 000123r
+# the marks of a left and of a right image: a word or letter of its own, leftImg8bit, m1_L1, 000123r, imgL
 _WORDS = (
-    r"(?<![A-Za-z])(?:left|LEFT)(?![a-z])|(?<![A-Z])Left(?![a-z])|(?<![A-Za-z])[lL](?:cam)?(?![A-Za-z])",
-    r"(?<![A-Za-z])(?:right|RIGHT)(?![a-z])|(?<![A-Z])Right(?![a-z])|(?<![A-Za-z])[rR](?:cam)?(?![A-Za-z])",
+    r"(?<![A-Za-z])(?:left|LEFT)(?![a-z])|(?<![A-Z])Left(?![a-z])|(?<![A-Za-z])[lL](?:cam)?(?![A-Za-z])"
+    r"|(?<=[a-z])L(?![A-Za-z])",
+    r"(?<![A-Za-z])(?:right|RIGHT)(?![a-z])|(?<![A-Z])Right(?![a-z])|(?<![A-Za-z])[rR](?:cam)?(?![A-Za-z])"
+    r"|(?<=[a-z])R(?![A-Za-z])",
 )
 # numbers count as marks after such a word, else at the end of a name: im0, image_02, cam1/000.png, 000123_0
 _NEVER = "(?!)"
 _NUMBERS = ((_NEVER, _NEVER), ("0", "1"), ("2", "3"), ("1", "2"), ("1", "5"), ("2", "6"), ("5", "6"))
-_AFTER_WORD = r"((?<![A-Za-z])(?:im|img|image|cam|camera|view)[_-]?)0*{}(?![0-9])"
+_AFTER_WORD = r"((?<![A-Za-z])(?:im|img|image|cam|camera|view|infra)[_-]?)0*{}(?![0-9])"
 _AT_END = r"((?<=[A-Za-z0-9])[_-])0*{}$"
 _POSITION = re.compile(r"#@([0-9]+(?:\+[0-9]+)+)$")
 
