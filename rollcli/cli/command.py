@@ -106,9 +106,10 @@ class Command(click.Command):
 
         Its matrices are small: threads spend ten times as long waiting for each other as working.
         """
-        from rollcli.run.workers.pool import limit_blas_threads
+        from rollcli.run.workers.pool import forget_settings, limit_blas_threads
 
         limit_blas_threads()
+        forget_settings()
         if ctx.params.get("verbose"):
             show_tracebacks()
         if not ctx.params.get("quiet"):

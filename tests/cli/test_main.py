@@ -166,6 +166,12 @@ main()
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "rollcli: interrupted\n")
 
 
+OF_OTHER_PROGRAMS = {
+    "MPLBACKEND": "module://matplotlib_inline.backend_inline",  # what a notebook sets for all that it starts
+    "SOURCE_DATE_EPOCH": "none",
+    "OPENCV_LOG_LEVEL": "DEBUG",
+    "OPENCV_IO_MAX_IMAGE_PIXELS": "some",
+}
 WATCH_NUMPY = """
 import os, sys
 
@@ -185,6 +191,7 @@ main()
     [
         ("estimate", "maps", "-q", "-j1", "-o", "rolls.csv"),
         ("derotate", "maps", "--roll", "1", "-o", "up", "-j1"),
+        pytest.param(("vdisparity", "maps", "--figure", "pdf", "-o", "v", "-j1"), marks=pytest.mark.slow),
         ("rig", "none.csv"),
         ("report", "none.csv"),
         ("simulate", "out", "--frames", "1", "--size", "64x48", "-j1"),
@@ -192,8 +199,9 @@ main()
         pytest.param(("evaluate", "paper", "maps", "-o", "out"), marks=pytest.mark.slow),
     ],
 )
-def test_linear_algebra_has_one_thread_when_numpy_is_loaded(tmp_path, arguments):
+def test_linear_algebra_has_one_thread_and_libraries_no_settings_of_other_programs(tmp_path, arguments):
     write_maps(tmp_path / "maps", 1)
     variables = {name: text for name, text in environment().items() if not name.endswith("_NUM_THREADS")}
-    done = python(WATCH_NUMPY, *arguments, cwd=tmp_path, env=variables)
-    assert done.stdout.startswith("threads: 1\n"), done.stderr
+    done = python(WATCH_NUMPY, *arguments, cwd=tmp_path, env=variables | OF_OTHER_PROGRAMS)
+    assert {*done.stdout.splitlines()} == {"threads: 1"}, done.stderr
+    assert done.returncode == 2 * ("none.csv" in arguments), done.stderr

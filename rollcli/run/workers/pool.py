@@ -22,6 +22,12 @@ from rollcli.run.workers.chunks import Chunk, Done, Job, Result, Task, Work, Wor
 from rollcli.run.workers.interrupt import ignore_signals, stop_signals
 
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+# of matplotlib, where a notebook names a backend that may not be installed here, and whose figures have no
+# dates; and of OpenCV, which writes its log into standard output, and has limits where we have our own
+_OF_OTHERS = (
+    *("MPLBACKEND", "SOURCE_DATE_EPOCH", "OPENCV_LOG_LEVEL"),
+    *(f"OPENCV_IO_MAX_IMAGE_{of}" for of in ("PIXELS", "WIDTH", "HEIGHT")),
+)
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # malloc.h
 _MIB = 2**20
 
@@ -30,6 +36,12 @@ def limit_blas_threads() -> None:
     """Limit NumPy's linear algebra to one thread, here and in child processes; call it before NumPy loads."""
     for name in _BLAS_THREADS:
         os.environ.setdefault(name, "1")
+
+
+def forget_settings() -> None:
+    """Forget what is set for other programs that use our libraries; call it before these load."""
+    for name in _OF_OTHERS:
+        os.environ.pop(name, None)
 
 
 def _load_decoders() -> None:
