@@ -79,8 +79,12 @@ def let_stderr_fail() -> None:
     """Replace standard error by a stream that never raises: a message that nobody reads is lost.
 
     A run must not end because its messages cannot be written: their reader has left, the log's disk is full,
-    the terminal is gone.
+    the terminal is gone. What C libraries print where a stream was closed before the program started is lost,
+    too: the file that is opened next would have its number, and hold that.
     """
+    while (spare := os.open(os.devnull, os.O_RDWR)) <= 2:  # standard error's number
+        os.set_inheritable(spare, True)  # workers that are spawned need it, too
+    os.close(spare)
     if sys.stderr is None:  # it was closed before the program started
         sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 (open as long as the program runs)
         return

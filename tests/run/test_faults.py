@@ -130,6 +130,12 @@ def test_a_closed_standard_output_is_an_error_in_one_line(maps, words):
     assert (done.returncode, done.stderr) == (1, "rollcli: standard output: is closed\n")
 
 
+def test_what_is_printed_where_all_streams_are_closed_is_in_no_result(maps):
+    closed = ["sh", "-c", 'exec "$@" <&- >&- 2>&-', "sh", *command("estimate", "maps", "-o", "rolls.csv")]
+    ended(closed, maps, env=environment(PYTHONPROFILEIMPORTTIME="1"))
+    assert len((maps / "rolls.csv.inputs").read_bytes()) == 51 * FRAMES
+
+
 # in a worker, reading certain maps kills it
 DEADLY_MAPS = """
 import multiprocessing, os, pathlib, signal
