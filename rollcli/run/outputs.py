@@ -322,7 +322,7 @@ def _real_folder(folder: str) -> str:
 @lru_cache(maxsize=1024)
 def _ignores_case(folder: str) -> bool:
     """Tell whether a.png and A.png are one file in a folder, by the names that it or its parents hold."""
-    here = Path(folder).resolve()
+    here = Path(os.path.realpath(folder))  # Path.resolve raises for links in a circle before Python 3.13
     while not is_folder(here) and here != here.parent:
         here = here.parent
     with contextlib.suppress(OSError), os.scandir(here) as entries:
