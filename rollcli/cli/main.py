@@ -106,7 +106,7 @@ def _with_hint(error: click.ClickException) -> str:
 
 @contextlib.contextmanager
 def _system_faults_told() -> Iterator[None]:
-    """End quietly where the reader of stdout has left, and say a full disk, and a folder that is gone."""
+    """End quietly where the reader of stdout has left; say a full disk, a folder gone, a locale too small."""
     try:
         yield
     except BrokenPipeError:  # which click would call a failure
@@ -120,6 +120,11 @@ def _system_faults_told() -> Iterator[None]:
         if error.errno != errno.ENOSPC:
             raise
         raise output_error(error.filename or "standard output", error) from None
+    except UnicodeEncodeError as error:
+        if sys.getfilesystemencoding() == "utf-8":  # it is another text's than a file's name
+            raise
+        reason = f"no file can have this name in the encoding of the locale, {error.encoding}"
+        raise InputError(f"{error.object}: {reason}; set PYTHONUTF8=1") from None
 
 
 _OPENCV = tuple(f"opencv-{name}python{kind}" for name in ("", "contrib-") for kind in ("-headless", ""))

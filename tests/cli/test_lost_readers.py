@@ -4,12 +4,13 @@ import os
 import pty
 import signal
 import subprocess
+import sys
 from functools import partial
 from pathlib import Path
 
 import pytest
 
-from tests.run_cli import command, ended, holding, started, wait_until, write_maps
+from tests.run_cli import command, ended, environment, holding, started, wait_until, write_maps
 from tests.slow import mostly_slow
 
 FRAMES = 8
@@ -36,6 +37,15 @@ def test_a_current_folder_that_is_gone_is_said(tmp_path):
     (tmp_path / "gone").mkdir()
     done = ended([*shell, *command("estimate", "maps")], tmp_path / "gone")
     assert (done.returncode, done.stderr) == (2, "rollcli: the current folder is gone\n")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of files are UTF-8 on this system")
+def test_a_name_that_the_locale_cannot_write_is_said(maps):
+    (maps / "options.toml").write_text('output = "\u00e9.csv"', encoding="utf-8")
+    line = command("estimate", "maps", "--config", "options.toml")
+    done = ended(line, maps, env=environment(LC_ALL="C", PYTHONUTF8="0", PYTHONCOERCECLOCALE="0"))
+    said = "\\xe9.csv: no file can have this name in the encoding of the locale, ascii; set PYTHONUTF8=1"
+    assert (done.returncode, done.stderr) == (2, f"rollcli: {said}\n")
 
 
 NO_DISK = pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
