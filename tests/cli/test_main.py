@@ -166,12 +166,8 @@ main()
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "rollcli: interrupted\n")
 
 
-OF_OTHER_PROGRAMS = {
-    "MPLBACKEND": "module://matplotlib_inline.backend_inline",  # what a notebook sets for all that it starts
-    "SOURCE_DATE_EPOCH": "none",
-    "OPENCV_LOG_LEVEL": "DEBUG",
-    "OPENCV_IO_MAX_IMAGE_PIXELS": "some",
-}
+OF_OTHER_PROGRAMS = dict.fromkeys(("MPLBACKEND", "SOURCE_DATE_EPOCH", "OPENCV_IO_MAX_IMAGE_PIXELS"), "none")
+OF_OTHER_PROGRAMS["OPENCV_LOG_LEVEL"] = "DEBUG"
 WATCH_NUMPY = """
 import os, sys
 
