@@ -20,8 +20,8 @@ class Encoding(str, Enum):
 
     PX = "px"  # as it is
     KITTI = "kitti"  # p / 256; 0 is no data
-    CITYSCAPES = "cityscapes"  # (p - 1) / 256; 0 is no data
-    SGBM = "sgbm"  # p / 16; negative is no data
+    CITYSCAPES = "cityscapes"  # (p - 1) / 256; 0 and 1 are no data
+    SGBM = "sgbm"  # p / 16
     FOUNDATIONSTEREO = "foundationstereo"  # (R * 255^2 + G * 255 + B) / 1000 of an RGB PNG; 0 is no data
     DEPTH = "depth"  # a distance z: focal length * baseline / z - doffs
 
@@ -103,8 +103,8 @@ def to_disparity(
         raise UsageError(f"scale {factor}: the stored numbers have no sign ({stored.values.dtype})")
     with np.errstate(all="ignore"):  # numbers too large for float32 become inf, and inf no data
         positive = stored.values
-        if factor < 0:  # whole numbers get room for their lowest
-            positive = -(positive if positive.dtype.kind == "f" else positive.astype(np.float64))
+        if factor < 0:  # as reals: whole numbers have no room for what their lowest becomes
+            positive = np.negative(positive, dtype=_real(positive))
         if used is Encoding.DEPTH:
             disparity = _from_depth(positive, abs(factor), calibration)
         else:
@@ -196,9 +196,14 @@ def resolve_encoding(encoding: str, dtype: np.dtype[Any], scale: float | None) -
         raise UsageError(f"encoding {encoding!r} is unknown: choose one of {names}") from None
 
 
+def _real(values: NDArray[Any]) -> type[np.floating[Any]]:
+    """Return the type of the pixels that stored numbers become."""
+    return np.float64 if values.dtype.kind == "f" and values.dtype.itemsize >= 8 else np.float32
+
+
 def _scaled(values: NDArray[Any], encoding: Encoding, scale: float) -> NDArray[Any]:
     """Pixels; whatever is not a positive finite number becomes 0."""
-    real = np.float64 if values.dtype.kind == "f" and values.dtype.itemsize >= 8 else np.float32
+    real = _real(values)
     if values.dtype.kind == "u" and encoding is not Encoding.CITYSCAPES:
         product: NDArray[Any] = np.multiply(values, real(scale), dtype=real)  # one pass: the usual case
         return product
@@ -213,7 +218,7 @@ def _scaled(values: NDArray[Any], encoding: Encoding, scale: float) -> NDArray[A
 
 def _from_depth(values: NDArray[Any], metres: float, calibration: Calibration | None) -> NDArray[Any]:
     """Turn stored depths into pixels of disparity; whatever is no depth becomes 0."""
-    real = np.float64 if values.dtype.kind == "f" and values.dtype.itemsize >= 8 else np.float32
+    real = _real(values)
     depth: NDArray[Any] = np.multiply(values, real(metres), dtype=real)
     focal_baseline, doffs = 1.0, 0.0
     if calibration is not None and calibration.baseline is not None:

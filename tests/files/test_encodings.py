@@ -19,6 +19,16 @@ def test_the_stored_numbers_are_left_alone():
     assert values.tolist() == [[65535, -1, 5]]
 
 
+@pytest.mark.parametrize("stored", ["int8", "int16", "int32", "float16", "float32", "float64"])
+def test_numbers_that_are_stored_negative_become_pixels_of_the_documented_type(stored):
+    pixels = "float64" if stored == "float64" else "float32"
+
+    found = to_disparity(Stored(np.array([[-128, -5, 0, 7]], stored), "npy"), scale=-0.3).disparity
+
+    assert found.dtype == pixels
+    assert (found == np.array([[128, 5, 0, 0]], pixels) * np.array(0.3, pixels)).all()
+
+
 TRUTHS = {"frame_0001": -8.0, "frame_0003": 12.0, "frame_0004": -4.0}
 
 
