@@ -79,10 +79,10 @@ def to_disparity(
         Pixels (of a depth: metres) per stored unit, in place of the encoding's own; makes "auto" take px.
         Negative where the numbers are stored negative: no data are then NaN, inf and >= 0.
     invalid : iterable of float
-        Stored values that mean no data, besides NaN, inf, <= 0, the file's own tag, 65535 in uint16, and a
-        constant plateau at either end of the range (`PlateauTuning`).
+        Stored values that mean no data, besides NaN, inf, <= 0, the file's own tag, the largest number of 16
+        bits, and a constant plateau at either end of the range (`PlateauTuning`).
     calibration : Calibration, optional
-        What turns a depth into a disparity; without it, the disparity of a depth z is 1/z.
+        What turns a depth into a disparity; without one that has a baseline, that of a depth z is 1/z.
 
     Raises
     ------
@@ -139,9 +139,11 @@ def read_disparity(
         Pixels (of a depth: metres) per stored unit, in place of the encoding's own; makes "auto" take px.
         Negative where maps are stored negative.
     invalid : float, optional
-        A stored value that means no data, besides NaN, inf, <= 0 and what the file itself marks.
+        A stored value that means no data, besides NaN, inf, <= 0, the largest number of 16 bits, what the
+        file itself marks, and a number at an end of the range that stands at many times as many pixels as the
+        one beside it.
     calibration : Calibration, optional
-        What turns a depth into a disparity; without it, the disparity of a depth z is 1/z.
+        What turns a depth into a disparity; without one that has a baseline, that of a depth z is 1/z.
 
     Returns
     -------
@@ -153,7 +155,7 @@ def read_disparity(
     InputError
         The file cannot be read, or is no map.
     UsageError
-        Unknown encoding, a scale of 0, or a calibration of another view.
+        Unknown encoding, a scale of 0, a negative one for unsigned numbers, or a calibration of another view.
 
     Examples
     --------
