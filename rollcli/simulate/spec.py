@@ -122,11 +122,10 @@ def draw_specs(options: SimulateOptions) -> list[FrameSpec]:
         colour=not options.grey,
         kerb=options.kerb or KERB,
     )
-    # what is not possible is refused, whatever would be drawn
-    for roll, pitch, offset in zip(
-        options.roll_deg, options.pitch_deg, options.principal_offset, strict=True
-    ):
-        lowest = replace(rig, roll=math.radians(roll), pitch=math.radians(pitch), height=options.height[0])
+    # what is not possible is refused, whatever would be drawn: a level rig has its right camera lowest
+    pitch = math.radians(np.clip(0.0, *options.pitch_deg))
+    for roll, offset in zip(options.roll_deg, options.principal_offset, strict=True):
+        lowest = replace(rig, roll=math.radians(roll), pitch=pitch, height=options.height[0])
         _offset(lowest, offset, offset)
     return [_drawn(replace(rig, index=index), options) for index in range(options.frames)]
 

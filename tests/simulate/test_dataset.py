@@ -109,6 +109,11 @@ def test_the_right_camera_is_above_the_road_just_when_the_baseline_leaves_room(p
     FrameSpec(roll=math.radians(40), pitch=pitch, height=1e-6)
     with pytest.raises(UsageError, match="right camera is under the road"):
         FrameSpec(roll=-math.radians(40), pitch=pitch, height=lowest - 1e-6)
+    # the pitch that is nearest to level leaves the least room, whatever would be drawn
+    poses = {"frames": 0, "roll_deg": (-40.0, 0.0), "pitch_deg": (-60.0, -float(pitch_deg))}
+    draw_specs(SimulateOptions(height=(lowest + 1e-6, 2.0), **poses))
+    with pytest.raises(UsageError, match="right camera is under the road"):
+        draw_specs(SimulateOptions(height=(lowest - 1e-6, 2.0), **poses))
 
 
 def test_the_help_has_the_numbers_that_are_used():
