@@ -265,7 +265,7 @@ class Textbook:
         return np.stack([np.ones_like(y), y, y * y], axis=1)
 
     def _alpha(self, Y: Floats) -> Floats:
-        """Return J d = (Y'Y)^-1 Y'd [GD eq. 7]."""
+        """Return J d = (Y'Y)^-1 Y'd [GD eq. 7-8]."""
         try:
             return np.asarray(np.linalg.solve(Y.T @ Y, Y.T @ self.d), np.float64)
         except np.linalg.LinAlgError:  # pixels of two rows determine no parabola

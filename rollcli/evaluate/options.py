@@ -1,4 +1,4 @@
-"""What the paper's experiments were asked to do; light, since the command line imports it for its help."""
+"""What `evaluate accuracy` and `evaluate paper` were asked to do; import-light, for their help."""
 
 from dataclasses import dataclass
 

@@ -131,7 +131,7 @@ def height_map(
     Parameters
     ----------
     disparity : array_like, shape (H, W)
-        Real numbers, px; <= 0, NaN and what is beyond 1e15 are no data.
+        Real numbers, px; <= 0, NaN, what is beyond 1e15 and what a masked array hides are no data.
     estimate : RollEstimate
         Of this map, or of one in which the rig stood as it does here.
     calibration : Calibration, optional

@@ -56,6 +56,11 @@ class StereoOptions:
     vertical_offset : float or None
         How much lower the right image lies, pixels of the size matched at: corrected as given, and
         nothing is measured; by default as --align says.
+
+    Raises
+    ------
+    UsageError
+        A value is out of its range, or `align` names no correction.
     """
 
     num_disparities: int | None = None

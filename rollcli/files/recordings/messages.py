@@ -152,7 +152,7 @@ def content_of(topic: Topic, data: memoryview, raw_of: CameraInfo | None = None)
     Parameters
     ----------
     topic : Topic
-    data : bytes
+    data : memoryview
         The message as it is serialized.
     raw_of : CameraInfo or None
         The message is a raw view of this camera: it is rectified.
