@@ -205,7 +205,7 @@ class Search:
         hint = f"; it holds {' '.join(sorted(endings)[:3])} files" if endings else ""
         if bag := next((each for each in BAGS if each in endings), ""):
             hint += f": name the bags themselves, as '{folder}/*{bag}'"
-        inner = any(is_folder(Path(folder, name)) for name in names[:_LOOKED_AT])
+        inner = any(is_archive(name) or is_folder(Path(folder, name)) for name in names[:_LOOKED_AT])
         lower = {name.lower(): name for name in names}
         left, right = (next((lower[name] for name in sorted(side) if name in lower), "") for side in _SIDES)
         if left and right:
