@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rollcli.errors import InputError, UsageError, about
+from rollcli.estimator.moments import LARGEST
 from rollcli.files.formats import Stored, read_stored
 from rollcli.rig.calibration import Calibration, require_calibration
 
@@ -206,7 +207,7 @@ def _real(values: NDArray[Any]) -> type[np.floating[Any]]:
 def _scaled(values: NDArray[Any], encoding: Encoding, scale: float) -> NDArray[Any]:
     """Pixels; whatever is not a positive finite number becomes 0."""
     real = _real(values)
-    if values.dtype.kind == "u" and encoding is not Encoding.CITYSCAPES:
+    if values.dtype.kind == "u" and encoding is not Encoding.CITYSCAPES and scale < LARGEST:
         product: NDArray[Any] = np.multiply(values, real(scale), dtype=real)  # one pass: the usual case
         return product
     pixels: NDArray[Any] = np.fmax(values, 0).astype(real)  # fmax: NaN gives way to 0
@@ -214,7 +215,7 @@ def _scaled(values: NDArray[Any], encoding: Encoding, scale: float) -> NDArray[A
         pixels = np.fmax(pixels - real(1), real(0))
     pixels *= real(scale)
     if not np.isfinite(pixels.max()):
-        pixels[np.isinf(pixels)] = 0
+        pixels[~np.isfinite(pixels)] = 0
     return pixels
 
 

@@ -29,6 +29,11 @@ def test_numbers_that_are_stored_negative_become_pixels_of_the_documented_type(s
     assert (found == np.array([[128, 5, 0, 0]], pixels) * np.array(0.3, pixels)).all()
 
 
+@pytest.mark.parametrize("stored", ["uint16", "int16", "float32"])
+def test_a_scale_beyond_what_pixels_hold_leaves_no_data(stored):
+    assert (to_disparity(Stored(np.array([[0, 5]], stored), "npy"), scale=1e300).disparity == 0).all()
+
+
 TRUTHS = {"frame_0001": -8.0, "frame_0003": 12.0, "frame_0004": -4.0}
 
 
