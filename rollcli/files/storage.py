@@ -107,6 +107,8 @@ def read_frame(
     InputError
         It does not exist, has more bytes than `most`, may not be read, is empty, is no regular file, or its
         store does not answer.
+    UsageError
+        The scheme of its URL is not supported, or an extra is missing.
     """
     location = str(location)
     name = name or public_name(location)

@@ -151,15 +151,15 @@ class EncodingOptions(NamedTuple):
     Attributes
     ----------
     encoding : str
-        px: pixels as they are; kitti: p/256; cityscapes: (p-1)/256; sgbm: p/16, negative is no data;
-        depth: metres (whole numbers: millimetres), which a calibration turns into disparities;
-        foundationstereo: (R*255*255 + G*255 + B)/1000 of an RGB PNG; auto: float and uint8 are px, uint16
-        is kitti, int16 is sgbm.
+        px: pixels as they are; kitti: p/256; cityscapes: (p-1)/256; sgbm: p/16; depth: metres (whole
+        numbers: millimetres), which a calibration turns into disparities; foundationstereo: (R*255*255 +
+        G*255 + B)/1000 of an RGB PNG; auto: uint16 is kitti, int16 is sgbm, the rest is px.
     scale : float or None
         Pixels = stored number * F (depth: metres = stored number * F); F replaces the factor of an
         encoding, and is negative where maps are stored negative.
     invalid : tuple of float
-        A further stored value that means no data (always: nan, inf, <= 0). Repeatable.
+        A further stored value that means no data (always: nan, inf, <= 0, the largest number of 16
+        bits). Repeatable.
     """
 
     encoding: str = "auto"
