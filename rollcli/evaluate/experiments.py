@@ -59,7 +59,6 @@ def rotate_nearest(disparity: NDArray[Any], angle: float) -> NDArray[Any]:
 
 DELTAS = tuple(math.pi / k for k in (1.8e3, 1.8e4, 1.8e5, 1.8e6))
 LAMBDAS = tuple(float(rate) for rate in range(1, 101))
-METHODS = ("gd", "line", "plane", "areas", "auto")
 
 
 @dataclass(frozen=True)
@@ -81,7 +80,7 @@ class Findings:
     solver_errors : dict of str to tuple
         For each of `SOLVERS`, per rotation, the error for each of `DELTAS` (Fig. 6).
     method_errors : dict of str to tuple
-        For each of `METHODS`, per rotation, the error, or None where the method found no angle.
+        For each of `_methods`, per rotation, the error, or None where the method found no angle.
     """
 
     file: str

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rollcli.estimator.request import SOLVERS
-from rollcli.evaluate.experiments import DELTAS, FORMS, LAMBDAS, METHODS, Findings, Times
+from rollcli.evaluate.experiments import DELTAS, FORMS, LAMBDAS, Findings, Times
 from rollcli.files.results import Row, csv_table
 
 Value = str | int | float | None
@@ -107,7 +107,7 @@ def solvers_table(found: Sequence[Findings]) -> Iterator[Line]:
 
 def methods_table(found: Sequence[Findings]) -> Iterator[Line]:
     """Yield the errors of our other methods after the same rotations."""
-    for method in METHODS:
+    for method in METHOD_NAMES:
         errors = [error for each in found for error in each.method_errors[method]]
         known = [error for error in errors if error is not None]
         yield {"method": method, **_errors(known), "no_angle": len(errors) - len(known)}

@@ -9,8 +9,8 @@ import pytest
 
 from rollcli.errors import EstimationError
 from rollcli.estimator.solvers.exact import exact
-from rollcli.evaluate.experiments import METHODS, SOLVERS, _best, examine, rotate_nearest, time_solvers
-from rollcli.evaluate.paper_tables import DELTAS_DEG, all_tables, column
+from rollcli.evaluate.experiments import SOLVERS, _best, examine, rotate_nearest, time_solvers
+from rollcli.evaluate.paper_tables import DELTAS_DEG, METHOD_NAMES, all_tables, column
 from tests.estimator.synthetic_maps import bent_road, degrees_apart, energy_of
 
 TURNS = [math.radians(turn) for turn in (-10, 0, 15)]
@@ -37,7 +37,7 @@ def test_golden_section_is_as_accurate_as_its_tolerance_and_descent_more(found):
 
 
 def test_every_method_follows_the_rotations(found):
-    for name in METHODS:
+    for name in METHOD_NAMES:
         errors = found.method_errors[name]
         assert len(errors) == len(TURNS)
         assert max(math.degrees(error) for error in errors) < 0.5, name

@@ -18,7 +18,6 @@ from rollcli.evaluate.experiments import (
     DELTAS,
     FORMS,
     LAMBDAS,
-    METHODS,
     SOLVERS,
     Findings,
     Textbook,
@@ -28,7 +27,7 @@ from rollcli.evaluate.experiments import (
 )
 from rollcli.evaluate.options import PaperOptions
 from rollcli.evaluate.paper import PAGE, paper_files
-from rollcli.evaluate.paper_tables import all_tables, table_csv
+from rollcli.evaluate.paper_tables import METHOD_NAMES, all_tables, table_csv
 from rollcli.evaluate.truth import KnownPose, read_truth
 from rollcli.files.results import Row
 from rollcli.run.options import InputOptions, RegionOptions
@@ -113,7 +112,7 @@ def _map_of(name="a.png", gd=(3, 4, 5, 6), sweep=7):
             solver: tuple(tuple(error * (1 + at) / (1 + k) for k in range(4)) for error in turned)
             for at, solver in enumerate(SOLVERS)
         },
-        {method: tuple(error * (1 + at) for error in turned) for at, method in enumerate(METHODS)},
+        {method: tuple(error * (1 + at) for error in turned) for at, method in enumerate(METHOD_NAMES)},
     )
 
 
@@ -153,7 +152,7 @@ def _tables_without_angles():
     """The tables, as CSV, of a map of which no method gives an angle, and half of the runs stop short."""
     found = _map_of()
     stopped = tuple(tuple(count if k % 2 else None for k, count in enumerate(each)) for each in found.sweep)
-    errors = dict.fromkeys(METHODS, (None,) * 3)
+    errors = dict.fromkeys(METHOD_NAMES, (None,) * 3)
     found = dataclasses.replace(found, sweep=stopped, method_errors=errors)
     return {name: table_csv(table).decode() for name, table in all_tables([found], [], [_times(0.1)]).items()}
 
