@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rollcli.estimator.moments import Floats, Grid, powers, solve_normal
 from rollcli.estimator.road.model import Parabola, Reals, RoadModel
 from rollcli.estimator.road.sample import quantile
-from rollcli.estimator.road.surface import Surface
+from rollcli.estimator.road.surface import ROUNDS, Surface
 from rollcli.estimator.tuning import IntervalTuning
 
 # 97.5 % quantiles of Student's t for 1, 2, ... degrees of freedom
@@ -33,7 +33,7 @@ class Jackknife:
     Attributes
     ----------
     bands, columns : ndarray, shape (groups, 4)
-        The change for each band along the road, and for each column across it.
+        The change for each band along the road, and for each column across it: as weights follow.
     white : ndarray, shape (4, 4)
         The textbook covariance, for as many pixels as could be independent.
     freedom : tuple of float
@@ -151,15 +151,20 @@ def jackknife(surface: Surface, theta: float, tuning: IntervalTuning) -> Jackkni
 
     total = bands.sum(0)
     inverse, whole, changes, bulge = _solved(total, np.concatenate([bands, columns]), prior)
+    again, grown = inverse @ (rows[:5] * surface.yields @ rows[:5].T), np.eye(5)
+    for _ in range(ROUNDS):  # what moves the road moves the weights, and these the road in the next round
+        grown = np.eye(5) + again @ grown
     weight, rest = float(total[0, 0]), max(0.0, float(total[5, 5] - whole.dot(total[:5, 5])))
     # the variance of a pixel, times how many repeat each other
-    white: Floats = inverse * (rest / weight * max(1.0, weight / tuning.independent_pixels))
+    variance = rest / weight * max(1.0, weight / tuning.independent_pixels)
+    white: Floats = variance * grown @ inverse @ grown.T
+    moved = changes @ grown.T
     if not surface.parabolic:  # there is no a2 to err
         white[2] = white[:, 2] = 0
     prior_share = prior * float(inverse[_CAMBER, _CAMBER])
     return Jackknife(
-        bands=changes[: tuning.groups, :_CAMBER],
-        columns=changes[tuning.groups :, :_CAMBER],
+        bands=moved[: tuning.groups, :_CAMBER],
+        columns=moved[tuning.groups :, :_CAMBER],
         white=white[:4, :4],
         freedom=(_freedom(bands), _freedom(columns)),
         # turned so far, as by half a turn, the model may be seen nowhere: then nothing is known

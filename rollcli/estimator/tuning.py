@@ -137,7 +137,7 @@ class IntervalTuning:
     groups: int = 6
     independent_pixels: int = 100
     white: float = 0.2
-    factor: float = 0.65
+    factor: float = 0.44
     uneven: float = 6.0
     noise_falls: float = 2.5
     twist: float = 0.0026

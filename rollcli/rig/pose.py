@@ -26,7 +26,7 @@ class IntervalTuning:
         (tests/benchmarks/bench_pose.py).
     """
 
-    factor: float = 0.77
+    factor: float = 0.47
     uneven: float = 32.0
 
 

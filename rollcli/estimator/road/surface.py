@@ -30,7 +30,7 @@ _REACH = 3.0  # tolerances from the plane beyond which a pixel is not looked at 
 _LEAST_WIDTH = 0.01  # tolerances, of a map without any error
 _MOST_TURN = 0.2  # radians that a round may turn the road by
 _LEAST_LEVEL = 0.5  # of the lane's level that ground has which is shown as road
-_ROUNDS = 3  # of the fit to the road, which starts from the lane ahead; with 2 it has not settled
+ROUNDS = 3  # of the fit to the road, which starts from the lane ahead; with 2 it has not settled
 _BINS = 10  # to each side of the profile, which reaches to twice its width
 _BLOCK = 2**20  # pixels
 # around a pixel: two pairs of opposite sides, in rows and columns of their own
@@ -72,6 +72,9 @@ class Surface:
         The y of the lowest row that was looked at.
     sides : tuple of float
         How far the map's first column is to the left of the origin, and its last one to the right, units.
+    yields : ndarray
+        The share of its weight that a pixel loses of its pull on the road: as the road moves towards it, its
+        weight grows, and moves the road the further. 0 where weights are fixed.
     """
 
     x: Floats
@@ -89,6 +92,7 @@ class Surface:
     limit: float = math.inf
     lowest: float = 0.0
     sides: tuple[float, float] = (1.0, 1.0)
+    yields: Floats | float = 0.0
 
     def covers(self, disparity: NDArray[Any], tuning: Tuning) -> Bools:
         """Return which pixels of a map (H, W) lie on the surface and rise as it does."""
@@ -181,6 +185,7 @@ def fit_surface(sample: Sample, road: Road, request: Request) -> Surface:
     if len(used) < _LEAST_PIXELS:
         raise EstimationError(HARDLY_A_PIXEL)
     x, y = near.places[:, used].astype(np.float64)
+    inside = np.sqrt(weights[used] / near.place[used].astype(np.float64))  # 1 - (distance / limit)^2
     return Surface(
         x,
         y,
@@ -197,6 +202,7 @@ def fit_surface(sample: Sample, road: Road, request: Request) -> Surface:
         limit=limit,
         lowest=sample.lowest,
         sides=sample.sides,
+        yields=4 / inside - 4,  # Tukey's (1 - s)^2 r has the derivative (1 - s)^2 (1 - 4 s / (1 - s))
     )
 
 
@@ -280,8 +286,9 @@ class NearPixels:
     def fitted(self, start: RoadModel) -> tuple[RoadModel, Singles, Singles, float, float]:
         """Fit (a0, a1, a2, theta) and the camber, starting from the lane's.
 
-        Gauss-Newton with Tukey's biweight, whose width shrinks from `start_width` as far as the spread of
-        the pixels ahead allows. The camber has a prior: where the pixels do not determine it, it stays small.
+        Gauss-Newton with Tukey's biweight, whose width goes from `start_width` to what the spread of the
+        pixels ahead asks for: to less as a rule, to more where the map has more noise than the tolerances
+        know of. The camber has a prior: where the pixels do not determine it, it stays small.
 
         Returns
         -------
@@ -300,7 +307,7 @@ class NearPixels:
         design[3] = start.bulge(start.lateral(across, along), start.disparity_along(along))
         squares = self._place_on(design, model)
         weights = self._weights(squares, limit)
-        for _ in range(_ROUNDS):
+        for _ in range(ROUNDS):
             products = self._products(design, weights)
             # the variance of the pixels over that of the prior, times how often they repeat each other
             total = products[0, 0]
@@ -310,7 +317,7 @@ class NearPixels:
             products[3, 5] -= precision * model.camber
             model = _moved(model, products)
             squares = self._place_on(design, model)
-            limit = min(limit, self._width(squares, weights))
+            limit = self._width(squares, weights)
             weights = self._weights(squares, limit)
         alone = np.square((design[5] + self.alone - self.d) / self.tolerance)
         limit = min(tuning.start_width, self._width(alone, weights))

@@ -127,6 +127,15 @@ def test_pixels_with_noise_that_averages_out_are_road():
     assert covered[(np.abs(side) < 1) & (disparity > 5)].mean() > 0.96
 
 
+def test_twice_as_much_noise_is_seen_as_twice_as_much_though_the_tolerance_knows_of_neither():
+    few, many = (surface_of(road_and_sides(sigma)[0]) for sigma in (0.75, 1.5))
+    seen = [
+        math.sqrt(np.average((each.d - each.model.disparity(each.x, each.y)) ** 2, weights=each.weights))
+        for each in (few, many)
+    ]
+    assert seen[1] / seen[0] == pytest.approx(2, rel=0.1)
+
+
 @pytest.mark.parametrize("slope", [-0.15, 0.15])
 def test_a_verge_beyond_the_edge_of_the_road_is_no_road(slope):
     road, side = road_and_sides()
