@@ -14,12 +14,13 @@ Key = TypeVar("Key")
 Value = TypeVar("Value")
 
 # the marks of a left and of a right image: a word or letter of its own, leftImg8bit, m1_L1, 000123r, imgL
-_WORDS = (
-    r"(?<![A-Za-z])(?:left|LEFT)(?![a-z])|(?<![A-Z])Left(?![a-z])|(?<![A-Za-z])[lL](?:cam)?(?![A-Za-z])"
-    r"|(?<=[a-z])L(?![A-Za-z])",
-    r"(?<![A-Za-z])(?:right|RIGHT)(?![a-z])|(?<![A-Z])Right(?![a-z])|(?<![A-Za-z])[rR](?:cam)?(?![A-Za-z])"
-    r"|(?<=[a-z])R(?![A-Za-z])",
+_WORD = (
+    r"(?<![A-Za-z])(?:{0}|{1})(?![a-z])|(?<![A-Z]){2}(?![a-z])"
+    r"|(?<![A-Za-z])[{3}{4}](?:cam)?(?![A-Za-z])|(?<=[a-z]){4}(?![A-Za-z])"
 )
+_WORDS = [
+    _WORD.format(side, side.upper(), side.title(), side[0], side[0].upper()) for side in ("left", "right")
+]
 # numbers count as marks after such a word, else at the end of a name: im0, image_02, cam1/000.png, 000123_0
 _NEVER = "(?!)"
 _NUMBERS = ((_NEVER, _NEVER), ("0", "1"), ("2", "3"), ("1", "2"), ("1", "5"), ("2", "6"), ("5", "6"))
