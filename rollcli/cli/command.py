@@ -104,7 +104,8 @@ class Command(click.Command):
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command with one thread of linear algebra, once it is told what has no effect.
 
-        Its matrices are small: threads spend ten times as long waiting for each other as working.
+        Its matrices are small: threads spend ten times as long waiting for each other as working. What the
+        environment sets for other programs that use the same libraries is left out.
         """
         from rollcli.run.workers.pool import forget_settings, limit_blas_threads
 

@@ -80,7 +80,7 @@ class Findings:
     solver_errors : dict of str to tuple
         For each of `SOLVERS`, per rotation, the error for each of `DELTAS` (Fig. 6).
     method_errors : dict of str to tuple
-        For each of `_methods`, per rotation, the error, or None where the method found no angle.
+        For gd, line, plane, areas and auto, per rotation, the error, or None where the method found no angle.
     """
 
     file: str

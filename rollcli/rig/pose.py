@@ -18,8 +18,8 @@ class IntervalTuning:
     Attributes
     ----------
     factor : float
-        On the root of the sum of squares: 0.94 to 0.96 of 180 rendered pairs are covered, and poses of 10 of
-        11 real streets at full and at half size agree (tests/benchmarks/bench_pose.py).
+        On the root of the sum of squares: 0.95 to 0.96 of 180 rendered pairs are covered, and poses of all 9
+        real streets at full and at half size agree (tests/benchmarks/bench_pose.py).
     uneven : float
         Of the road's unevenness (`Jackknife.uneven`) over the distance of the tangent in camera heights:
         radians. Of rendered roads of ISO 8608's classes A to D, without it 0.1 to 0.2 are covered
