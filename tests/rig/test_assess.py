@@ -38,6 +38,9 @@ def test_a_single_row_is_a_frame_whatever_its_kind():
     for rows in ([only], [SCHEMA(**only)], {name: [cell] for name, cell in only.items()}):
         rig = rollcli.assess_rig(rows)
         assert (rig.count, rig.frames.files, rig.now().value) == (1, ["run/0.png"], pytest.approx(1.5))
+    failed = make_dataclass("Failed", ["file", "status"])("run/1.png", "error")
+    for rows in ([failed, SCHEMA(**only)], [SCHEMA(**only), failed]):
+        assert rollcli.assess_rig(rows).failed == 1
     alone = (columns([level], [0.1], folder=f"data/{level}/") for level in (1, 4))
     rig = rollcli.assess_rig(joined(*alone), groups="data/*")
     assert [each.differs for each in rig.drives] == [False, False]  # how far frames scatter is not known

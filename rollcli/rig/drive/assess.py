@@ -422,7 +422,7 @@ def _columns(rows: Sequence[Any]) -> dict[str, list[Any]]:
     """Return the columns of rows that are mappings or have attributes."""
     names = ("status", "file", *COLUMNS)
     if rows and not isinstance(rows[0], Mapping):
-        return {name: [getattr(row, name) for row in rows] for name in names if hasattr(rows[0], name)}
+        rows = [{name: getattr(row, name) for name in names if hasattr(row, name)} for row in rows]
     there = [name for name in names if not rows or any(name in row for row in rows)]
     return {name: [row.get(name) for row in rows] for name in there}
 
