@@ -90,10 +90,10 @@ def vdisparity(options: records.VDisparityOptions) -> int:
 
     INPUTS are maps (PNG, TIFF, NPY, NPZ, PFM, EXR), folders, .zip and .tar of them, quoted patterns, or - for
     paths on stdin. The picture is an 8-bit PNG on a log scale; its first rows are those of the map. The map
-    is taken as it is, whereas `estimate --vdisparity` rotates it upright first. Where a road is found, its
-    disparity along the middle column is drawn as a dashed curve: on a de-rotated map the road's pixels lie on
-    it. With a calibration, the road's horizon on that column is drawn, too. --figure needs the extra:
-    pip install "rollcli[report]".
+    is taken as it is, whereas `estimate --vdisparity` rotates it upright first. Where a road is found whose
+    angle is not suspect, its disparity along the middle column is drawn as a dashed curve: on a de-rotated
+    map the road's pixels lie on it. With a calibration, the road's horizon on that column is drawn, too.
+    --figure needs the extra: pip install "rollcli[report]".
 
     Examples
     --------

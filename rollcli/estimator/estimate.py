@@ -29,7 +29,8 @@ class RollEstimate:
     status : str
         "ok", or "suspect": `message` says why the angle is doubtful.
     message : str
-        Reasons, joined by "; ", and how a pair without enough road was matched; else empty.
+        Reasons to doubt, and notes: of another minimum that was replaced, of how a pair without enough road
+        was matched, of why there is no pose; joined by "; ". Else empty.
     method : str
     iterations : int
     converged : bool
@@ -156,11 +157,11 @@ def estimate_roll(
     Parameters
     ----------
     disparity : array_like, shape (H, W)
-        Real numbers, px (any constant factor gives the same angle); <= 0, NaN and what is beyond
-        1e15 are no data.
+        Real numbers, px (a constant factor changes no angle, as long as they lie from 1e-12 to 1e12);
+        <= 0, NaN and what is beyond 1e15 are no data.
     request : Request, optional
     mask : array_like, shape (H, W), optional
-        Non-zero where a pixel may be used.
+        Neither 0 nor NaN where a pixel may be used.
     road_mask : bool
         Whether to return which pixels were used as road.
 

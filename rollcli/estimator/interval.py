@@ -84,7 +84,7 @@ class Interval:
     noise : float
         The part of the half-width that noise and misfit make.
     half_width : float
-        All of it: with the part that an uneven road makes. At most a right angle: there are no other rolls.
+        The whole of it. At most a right angle: there are no other rolls.
     """
 
     noise: float

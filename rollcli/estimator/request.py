@@ -88,7 +88,7 @@ class Request:
     Raises
     ------
     UsageError
-        When a value is out of range.
+        When a value is out of range; of a calibration's, `Calibration` tells.
     """
 
     method: str = "gd"

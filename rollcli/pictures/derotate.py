@@ -41,7 +41,8 @@ def derotate(
     Returns
     -------
     ndarray
-        Of the same dtype; of the same shape unless `expand`. No data is written as the map writes it.
+        Of the same dtype; of the same shape unless `expand`. No data is written as the map writes it, and in
+        whole numbers as 0 where that is positive.
 
     Raises
     ------

@@ -149,7 +149,8 @@ def height_map(
     Raises
     ------
     UsageError
-        The map is not of the estimate's size, this is no estimate, or the calibration is of another view.
+        The map is no array of real numbers of the estimate's size, this is no estimate, or the calibration is
+        of another view.
 
     Examples
     --------

@@ -85,7 +85,8 @@ def estimate_roll(
     Raises
     ------
     UsageError
-        When an argument is out of range, or the calibration is of another view.
+        When an argument is out of range, these are no map or no mask of its size, or the calibration is of
+        another view.
     InputError
         When the calibration's file cannot be read.
     EstimationError
@@ -180,7 +181,8 @@ def estimate_pair(
     Raises
     ------
     InputError
-        The images differ in size, are too small to match, are swapped, or do not show the same scene.
+        The images are of another type, differ in size, are too small to match, are swapped, or do not show
+        the same scene.
     UsageError
         An argument is out of range, or the calibration is of another view.
     EstimationError

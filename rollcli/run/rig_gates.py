@@ -58,7 +58,7 @@ class Health:
     Attributes
     ----------
     frames : int
-        Pairs that were measured.
+        Pairs that were measured, since the last jump.
     parts : tuple of Estimate
         In the order of `ALIGNMENT`: px, degrees, per cent, px in the corners.
     size : tuple of int

@@ -40,7 +40,8 @@ class Road:
     score : float
         The share of the road-like pixels ahead that lie on the plane, less those below it; at most 1.
     rival : float
-        The best score of another plane, one whose roll differs by `DoubtTuning.other_angle` or more.
+        The best score of another plane, one whose roll differs by more than `DoubtTuning.other_angle`; -1
+        where there is none.
     aspect : float
         See `Request`.
     """
