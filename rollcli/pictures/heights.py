@@ -123,6 +123,7 @@ def unit_of(calibration: Calibration | None) -> str:
     return CAMERA_HEIGHTS if calibration is None or calibration.baseline is None else METRES
 
 
+@np.errstate(all="ignore")
 def height_map(
     disparity: ArrayLike, estimate: RollEstimate, calibration: Calibration | None = None
 ) -> Singles:

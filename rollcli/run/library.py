@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rollcli.errors import UsageError, as_usage
@@ -28,6 +29,7 @@ from rollcli.run.read import Source, matched_source, road_finder
 from rollcli.stereo.options import StereoOptions
 
 
+@np.errstate(all="ignore")  # whatever its caller wants of numbers: weights underflow in most maps
 def estimate_roll(
     disparity: ArrayLike,
     *,
@@ -140,6 +142,7 @@ def _in_pixels(values: NDArray[Any]) -> tuple[NDArray[Any], Stored]:
     return to_disparity(stored, encoding="px").disparity, stored
 
 
+@np.errstate(all="ignore")
 def estimate_pair(
     left: NDArray[Any],
     right: NDArray[Any],

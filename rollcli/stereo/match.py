@@ -189,6 +189,7 @@ class StereoMatch:
 _DEFAULT = StereoOptions()
 
 
+@np.errstate(all="ignore")
 def compute_disparity(
     left: NDArray[Any],
     right: NDArray[Any],

@@ -238,6 +238,7 @@ class RigAssessment:
         return found.now if found is not None else Estimate()
 
 
+@np.errstate(all="ignore")
 def assess_rig(
     rows: Any, *, include_suspect: bool = False, groups: str = AUTO, origins: Sequence[str] = ()
 ) -> RigAssessment:
