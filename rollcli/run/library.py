@@ -298,6 +298,7 @@ def open_recording(
     ...
     rollcli.errors.UsageError: rolls.csv: is no .bag, .db3, .mcap or rosbag2 folder
     """
+    from rollcli.files.recordings import bags, video
     from rollcli.files.recordings.frames import frames_of_bag, readable_bags
 
     name = os.fspath(path)
@@ -321,18 +322,21 @@ def open_recording(
         ((_, files),), rests = readable_bags([(name, files)])
         found = frames_of_bag(files, name, topic, left_topic, right_topic, 1000 * sync_tolerance)
         frames, camera = [*found.frames, *((rest, None) for rest in rests)], found.calibration
-    for one, other in frames:
-        if other is None:
-            stored = read_stored(one.location, one.name, rgb=encoding == Encoding.FOUNDATIONSTEREO)
-            read = to_disparity(stored, encoding=encoding, scale=scale, calibration=camera)
-            yield RecordedFrame(one.name, one.stamp, read.disparity, None, None, camera)
-        else:
-            left = read_image(one.location, one.name)
-            if side_by_side:
-                views = views_of(left, side_by_side, one.name)
+    try:
+        for one, other in frames:
+            if other is None:
+                stored = read_stored(one.location, one.name, rgb=encoding == Encoding.FOUNDATIONSTEREO)
+                read = to_disparity(stored, encoding=encoding, scale=scale, calibration=camera)
+                yield RecordedFrame(one.name, one.stamp, read.disparity, None, None, camera)
             else:
-                views = left, read_image(other.location, other.name)
-            yield RecordedFrame(one.name, one.stamp, None, *views, camera)
+                left = read_image(one.location, one.name)
+                if side_by_side:
+                    views = views_of(left, side_by_side, one.name)
+                else:
+                    views = left, read_image(other.location, other.name)
+                yield RecordedFrame(one.name, one.stamp, None, *views, camera)
+    finally:  # other threads open theirs again
+        (video if is_video(name) else bags).close_all()
 
 
 def _of_videos(name: str, right: str | None, layout: str | None) -> Sequence[tuple[Input, Input | None]]:

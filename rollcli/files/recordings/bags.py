@@ -455,3 +455,6 @@ def _opened(path: str, size: int, modified_ns: int, process: int, thread: int) -
                 return kind(path)
     what = "is empty" if not head else "is no ROS 1 bag, MCAP file or sqlite3 bag"
     raise InputError(f"{path}: {what}")
+
+
+close_all = _opened.cache_clear

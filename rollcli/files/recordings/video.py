@@ -127,6 +127,9 @@ def _decoder(path: str, size: int, modified_ns: int, process: int, thread: int) 
     return _Decoder(path, path, _ONE_THREAD)
 
 
+close_all = _decoder.cache_clear
+
+
 class _Decoder:
     """A video that is open."""
 

@@ -226,6 +226,7 @@ def test_python_iterates_the_frames_of_a_bag(tmp_path):
     path = write_bag(tmp_path, "drive", "bag", drive(2))
     with ThreadPoolExecutor(3) as pool:
         found, *others = pool.map(list, map(package.open_recording, [path] * 9))
+    assert path.resolve() not in [each.resolve() for each in Path("/proc/self/fd").glob("*")]  # closed
     assert [each.stamp for each in found] == [START, START + STEP]
     for frames in (found, *others):
         np.testing.assert_array_equal([each.disparity for each in frames], maps(2))
