@@ -487,9 +487,10 @@ def _file(value: Any) -> str:
 def _flag(value: Any) -> bool | None:
     if value is None or value == "":
         return None
-    if not isinstance(value, bool | str):
+    if not isinstance(value, bool | str | float):
         raise ValueError(value)
-    return {"true": True, "false": False}[str(value).lower()]
+    # numbers: pandas makes them of a column of JSON Lines that has an empty cell
+    return {"true": True, "false": False, "1.0": True, "0.0": False}[str(value).lower()]
 
 
 def _number(kind: type, low: float, high: float, value: Any) -> Any:
@@ -588,6 +589,8 @@ def _value(name: str, cell: Any, line: str) -> Any:
         return READERS[name](cell)
     except (KeyError, ValueError, TypeError, OverflowError) as error:
         what = f"status: {', '.join(STATUSES)}" if name == "status" else f"value for {name}"
+        if cell == name:
+            what += "; leave out this second header, or give the results one by one"
         shown = "" if cell is None else cell
         raise InputError(f"{line}: {shown!r:.80} is no {what}") from error
 
