@@ -264,6 +264,7 @@ def assess_rig(
     RigAssessment
         `now()` is the roll, degrees: its `value`, and `ci95`, half-width of the 95 % interval; None where
         there is none. `latest()` has `segments`, `jumps` and `drift` of the last drive.
+        `drives[-1].quantities["pitch"]` has these of the pitch, and its `now`; so of "height".
 
     Raises
     ------
