@@ -5,10 +5,11 @@
 Render FRAMES stereo pairs (40 by default), half with rolls within +-10 degrees, half within +-35, and match
 each once by SGBM. Make two worse maps of each: noise on two thirds of the pixels, disparities rounded to four
 pixels, one pixel in 50 left, an own bonnet, a truck ahead, or a wall over nearly half of the image; and one
-without a road: upside down, a depth map, a wall, or patches of sky. Where real maps with known rolls lie in
-../shared/realmaps, take every third of them too. Then estimate all maps with each number of `Tuning` times
-0.67, times 1.5, and switched off where that means something; with --off, only switched off, which many
-frames can then be had for; with --together, some numbers switched off at once, which shows substitutes.
+without a road: upside down, a depth map, a wall, or patches of sky. Add 20 scenes without a road of each kind
+of bench_roadless.py and, where maps with known rolls lie in ../shared/realmaps, every third of them. Then
+estimate all maps with each number of `Tuning` times 0.67, times 1.5, and switched off where that means
+something; with --off, only switched off, which many frames can then be had for; with --together, some numbers
+switched off at once, which shows substitutes.
 Every second rendered map is also turned by 5 degrees, nearest pixel: what is "turned" has a known roll, too.
 
 Columns: 95 % and worst error of the rendered maps, degrees; gross errors (above 0.5 degrees, or no angle) of
@@ -37,6 +38,7 @@ limit_blas_threads()
 
 import cv2
 import numpy as np
+from bench_roadless import KINDS, roadless_map
 from matched import matched
 from numpy.typing import NDArray
 
@@ -48,6 +50,7 @@ from rollcli.files.encodings import read_disparity
 
 REAL = Path(__file__).parents[3] / "shared" / "realmaps"
 SEEDS = {81: 10, 82: 35}  # seed, and the largest roll, degrees
+SCENES, SCENE_SEED = 20, 83  # of each kind without a road
 OFF = {
     "sample.uneven_share": 0.0,
     "search.off_slope_weight": 1.0,
@@ -57,6 +60,7 @@ OFF = {
     "interval.twist": 0.0,
     "interval.slant": 0.0,
     "doubts.near_minimum": 0.0,
+    "doubts.narrowest": 0.0,
     "doubts.filled_by_horizon": -1.0,
     "doubts.most_below": 1e6,
     "doubts.least_beyond": -1.0,
@@ -190,6 +194,11 @@ def cases(frames: int, every: int) -> list[Case]:
             for way in (WORSE[index % 6], WORSE[(index + 1 + index // 6) % 6]):
                 found.append(Case(degraded(disparity, way, rng), roll, roll, "degraded"))
             found.append(Case(without_road(disparity, ROADLESS[index % 4], rng), NAN, NAN, "roadless"))
+    for number, kind in enumerate(KINDS):
+        scenes = (np.random.default_rng([SCENE_SEED, number, index]) for index in range(SCENES))
+        found += [
+            Case(roadless_map(kind, scene).astype(np.float32), NAN, NAN, "roadless") for scene in scenes
+        ]
     if REAL.is_dir():
         with (REAL / "reference.csv").open() as file:
             rows = [row for row in csv.DictReader(file) if row["lo_deg"] and "sequence" not in row["file"]]
