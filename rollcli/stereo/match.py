@@ -112,7 +112,7 @@ _WIDEST = 2**14 - 1  # px: they are made twice as large, and OpenCV reads betwee
 _FURTHEST = 12.0, 0.03, 0.02  # offset, rotation and scale that no rig in use has: px, radians, share
 # the doubts of a pair: its correction was still changing when it was given up, or could not be checked; its
 # columns may be far from where they are believed to be; it is not level once it was levelled as a file says
-NOT_LEVELLED = "the views are not level, and could not be levelled, as where they are not rectified"
+NOT_LEVELLED = "the views are not level, and could not be levelled, as if not rectified or of two moments"
 TOO_LITTLE = "too little can be compared to tell whether the views are level"
 NOT_TOLD_BY_ROWS = (
     f"the rows do not tell whether the right view is larger, bent or of another moment: {RECALIBRATE}"

@@ -108,6 +108,7 @@ def test_a_pair_that_runs_away_is_given_up_after_four_matches(monkeypatch):
     rig = Rig(lambda at: at + 1.0)
     corrected, doubt = rig.run(monkeypatch, lies(0.0))
     assert doubt == match.NOT_LEVELLED
+    assert "of two moments" in doubt  # as where one camera is a frame late
     assert len(rig.matched) == 4
     assert corrected == rig.matched[-1]  # what was matched, not what would be tried next
 
